@@ -1,0 +1,293 @@
+#include "cli_options.h"
+
+#include <ctype.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { B = 1 << CLI_BUILD, V = 1 << CLI_VIEW, S = 1 << CLI_SHOT, I = 1 << CLI_INFO, C = 1 << CLI_CHECK };
+
+typedef bool (*reader)(cli_options *o, const char *value);
+
+static const struct {
+    const char *name, *arguments, *purpose, *details;
+} commands[CLI_COMMANDS] = {
+    [CLI_BUILD] = {"build", "SCANS... -o NAME.ipts", "make a dataset of files and folders of scans",
+                   "Reads LAS, PLY and text (.xyz .txt .asc .csv .pts); folders are searched recursively. No point is ever\n"
+                   "lost: what is dropped is counted by reason, what is left out is named.\n"},
+    [CLI_VIEW] = {"view", "NAME.ipts | SCANS...", "look at a dataset, or at raw scans, in a window",
+                  "Raw scans are built first, into a temporary dataset or the one that -o names. In the window, F1 shows the keys.\n"},
+    [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",
+                  "Without --eye and --target the picture shows all of the site. The same dataset and options give the same bytes.\n"},
+    [CLI_INFO] = {"info", "NAME.ipts", "say what is in a dataset", ""},
+    [CLI_CHECK] = {"check", "NAME.ipts", "prove that nothing in a dataset is lost or damaged",
+                   "Reads every byte: checksums, the place of every point, every promise of the structure.\n"},
+};
+
+static bool read_count(const char *text, uint64_t low, uint64_t high, uint64_t *out)
+{
+    char *end;
+    if (!isdigit((unsigned char)text[0])) return false;
+    unsigned long long value = strtoull(text, &end, 10);
+    if (*end != '\0' || value < low || value > high) return false;
+    *out = value;
+    return true;
+}
+
+static bool read_u32(const char *text, uint32_t low, uint32_t high, uint32_t *out)
+{
+    uint64_t value;
+    if (!read_count(text, low, high, &value)) return false;
+    *out = (uint32_t)value;
+    return true;
+}
+
+/* A positive number with a unit: K, M, G, T, of `base` (1000 for points, 1024 for bytes). */
+static bool read_amount(const char *text, double base, uint64_t *out)
+{
+    static const char units[] = "KMGT";
+    char *end;
+    if (!isdigit((unsigned char)text[0]) && text[0] != '.') return false;
+    double value = strtod(text, &end);
+    if (*end != '\0') {
+        const char *unit = strchr(units, toupper((unsigned char)*end));
+        if (unit == NULL) return false;
+        value *= pow(base, (double)(unit - units + 1));
+        end++;
+        if (base > 1000 && (*end == 'i' || *end == 'I')) end++;
+        if (base > 1000 && (*end == 'b' || *end == 'B')) end++;
+    }
+    if (*end != '\0' || !(value >= 1) || value > 0x1p62) return false;
+    *out = (uint64_t)value;
+    return true;
+}
+
+static bool read_real(const char *text, double low, double high, double *out)
+{
+    char *end;
+    double value = strtod(text, &end);
+    if (end == text || *end != '\0' || !(value >= low && value <= high)) return false;
+    *out = value;
+    return true;
+}
+
+static bool read_triple(const char *text, double out[3])
+{
+    int used = 0;
+    if (sscanf(text, "%lf,%lf,%lf%n", &out[0], &out[1], &out[2], &used) != 3 || text[used] != '\0') return false;
+    return isfinite(out[0]) && isfinite(out[1]) && isfinite(out[2]);
+}
+
+static bool o_output(cli_options *o, const char *v) { return (o->output = v)[0] != '\0'; }
+static bool o_temp_dir(cli_options *o, const char *v) { return (o->temp_dir = v)[0] != '\0'; }
+static bool o_columns(cli_options *o, const char *v) { return (o->columns = v)[0] != '\0'; }
+static bool o_screenshot(cli_options *o, const char *v) { return (o->screenshot = v)[0] != '\0'; }
+static bool o_json(cli_options *o, const char *v) { return (void)v, o->json = true; }
+static bool o_stats(cli_options *o, const char *v) { return (void)v, o->stats = true; }
+static bool o_force(cli_options *o, const char *v) { return (void)v, o->force = true; }
+static bool o_quiet(cli_options *o, const char *v) { return (void)v, o->quiet = true; }
+static bool o_help(cli_options *o, const char *v) { return (void)v, o->help = true; }
+static bool o_no_edl(cli_options *o, const char *v) { return (void)v, o->look.no_edl = true; }
+static bool o_threads(cli_options *o, const char *v) { return read_u32(v, 1, 1024, &o->threads); }
+static bool o_frames(cli_options *o, const char *v) { return read_u32(v, 1, UINT32_MAX, &o->frames); }
+static bool o_memory(cli_options *o, const char *v) { return read_amount(v, 1024, &o->memory); }
+static bool o_depth(cli_options *o, const char *v) { return read_u32(v, 1, 9, &o->inner_depth); }
+static bool o_ram(cli_options *o, const char *v) { return read_amount(v, 1024, &o->limits.ram_cache_bytes); }
+static bool o_gpu(cli_options *o, const char *v) { return read_amount(v, 1024, &o->limits.gpu_cache_bytes); }
+static bool o_eye(cli_options *o, const char *v) { return o->camera.has_eye = read_triple(v, o->camera.eye); }
+static bool o_target(cli_options *o, const char *v) { return o->camera.has_target = read_triple(v, o->camera.target); }
+static bool o_fov(cli_options *o, const char *v) { return o->camera.has_fov = read_real(v, 1, 170, &o->camera.fov_deg); }
+
+static bool o_budget(cli_options *o, const char *v)
+{
+    if (strcmp(v, "all") != 0) return read_amount(v, 1000, &o->limits.budget_points);
+    o->limits.budget_points = REND_ALL;
+    return true;
+}
+
+static bool o_min_node_size(cli_options *o, const char *v)
+{
+    double px;
+    if (!read_real(v, 0, 1e6, &px)) return false;
+    o->limits.min_node_px = px > 0 ? (float)px : 1e-6f; /* 0: no node is too small */
+    return true;
+}
+
+static bool o_point_size(cli_options *o, const char *v)
+{
+    double size;
+    size_t n = strlen(v);
+    o->look.size_mode = REND_SIZE_AUTO;
+    if (strcmp(v, "auto") == 0) return true;
+    if (n > 1 && v[n - 1] == 'm') {
+        char *end;
+        size = strtod(v, &end);
+        o->look.size_mode = REND_SIZE_WORLD;
+        o->look.point_m = (float)size;
+        return end == v + n - 1 && size > 0 && isfinite(size);
+    }
+    o->look.size_mode = REND_SIZE_FIXED;
+    if (!read_real(v, 1, 64, &size)) return false;
+    o->look.point_px = (float)size;
+    return true;
+}
+
+static bool o_up(cli_options *o, const char *v)
+{
+    o->camera.has_up = true;
+    if (strlen(v) == 1 && strchr("xyz", v[0]) != NULL) {
+        for (int a = 0; a < 3; a++) o->camera.up[a] = v[0] == "xyz"[a];
+        return true;
+    }
+    return read_triple(v, o->camera.up) && fabs(o->camera.up[0]) + fabs(o->camera.up[1]) + fabs(o->camera.up[2]) > 0;
+}
+
+static bool o_size(cli_options *o, const char *v)
+{
+    int used = 0;
+    if (sscanf(v, "%u%*1[xX]%u%n", &o->width, &o->height, &used) != 2 || v[used] != '\0') return false;
+    return o->width >= 1 && o->width <= REND_SIZE_MAX && o->height >= 1 && o->height <= REND_SIZE_MAX;
+}
+
+static bool o_colour(cli_options *o, const char *v)
+{
+    static const char *const names[REND_COLOUR_COUNT] = {"rgb", "intensity", "elevation"};
+    for (int i = 0; i < REND_COLOUR_COUNT; i++) {
+        if (strcmp(v, names[i]) != 0) continue;
+        o->look.colour = (rend_colour)i;
+        return true;
+    }
+    return false;
+}
+
+static const struct {
+    const char *name, *value; /* value NULL: a switch */
+    int letter;               /* 0: none */
+    int commands;
+    reader read;
+    const char *help;
+} options[] = {
+    {"output", "PATH", 'o', B | V | S, o_output, "where the dataset or the picture goes"},
+    {"force", NULL, 0, B | V, o_force, "replace a dataset that is there"},
+    {"threads", "N", 0, B | V | S, o_threads, "threads of the builder (default: one per processor)"},
+    {"memory", "SIZE", 0, B | V | S, o_memory, "most memory the build takes, 64M or more (default: a quarter of the machine)"},
+    {"temp-dir", "FOLDER", 0, B | V | S, o_temp_dir, "where scratch files go (default: beside the output)"},
+    {"inner-depth", "N", 0, B | V | S, o_depth, "levels of the octree inside each node, 1 to 9 (default: 7)"},
+    {"columns", "NAMES", 0, B | V | S, o_columns, "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
+    {"budget", "POINTS", 0, V | S, o_budget, "most points drawn in a frame, as in 2M, or all (default: 3M in a window, all in a shot)"},
+    {"min-node-size", "PX", 0, V | S, o_min_node_size, "nodes that are smaller on the screen are not drawn (default: by detail)"},
+    {"point-size", "SIZE", 0, V | S, o_point_size, "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
+    {"color", "BY", 0, V | S, o_colour, "rgb, intensity or elevation (default: rgb)"},
+    {"colour", "BY", 0, V | S, o_colour, NULL},
+    {"no-edl", NULL, 0, V | S, o_no_edl, "without eye-dome lighting"},
+    {"size", "WxH", 0, V | S, o_size, "of the picture or window, pixels (default: 1280x720)"},
+    {"eye", "X,Y,Z", 0, V | S, o_eye, "where the camera stands, in the coordinates of the scans"},
+    {"target", "X,Y,Z", 0, V | S, o_target, "what it looks at"},
+    {"up", "X,Y,Z", 0, V | S, o_up, "which way is up: a direction, or x, y, z (default: z)"},
+    {"fov", "DEGREES", 0, V | S, o_fov, "vertical field of view, 1 to 170 (default: 60)"},
+    {"ram-cache", "SIZE", 0, V | S, o_ram, "most memory for loaded nodes (default: 1G)"},
+    {"gpu-cache", "SIZE", 0, V | S, o_gpu, "most graphics memory for nodes (default: 1G)"},
+    {"frames", "N", 0, V, o_frames, "close the window after so many frames"},
+    {"screenshot", "PATH", 0, V, o_screenshot, "write the window's picture when it closes"},
+    {"stats", NULL, 0, I, o_stats, "read every point: extent, means, memory of other structures"},
+    {"json", NULL, 0, B | V | S | I | C, o_json, "the result as JSON on standard output"},
+    {"quiet", NULL, 'q', B | V | S | C, o_quiet, "no progress line"},
+    {"help", NULL, 'h', B | V | S | I | C, o_help, "this page"},
+};
+enum { OPTION_COUNT = sizeof options / sizeof options[0] };
+
+const char *cli_command_name(cli_command command)
+{
+    return commands[command].name;
+}
+
+bool cli_command_from_name(const char *name, cli_command *out)
+{
+    for (int c = 0; c < CLI_COMMANDS; c++) {
+        if (strcmp(commands[c].name, name) != 0) continue;
+        *out = (cli_command)c;
+        return true;
+    }
+    return false;
+}
+
+static bool misuse(mospt_err *err, const char *format, const char *what, const char *more)
+{
+    return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), format, what, more);
+}
+
+bool cli_options_read(cli_command command, int argc, char **argv, cli_options *out, mospt_err *err)
+{
+    struct option list[OPTION_COUNT + 1] = {{0}};
+    char letters[2 * OPTION_COUNT + 3] = ":";
+    cli_options o = {.command = command};
+    size_t count = 0, letter_count = 1;
+    for (int i = 0; i < OPTION_COUNT; i++) {
+        if (!(options[i].commands >> command & 1)) continue;
+        list[count++] = (struct option){options[i].name, options[i].value != NULL, NULL, 256 + i};
+        if (options[i].letter == 0) continue;
+        letters[letter_count++] = (char)options[i].letter;
+        if (options[i].value != NULL) letters[letter_count++] = ':';
+    }
+    letters[letter_count] = '\0';
+    optind = 1;
+    opterr = 0;
+    for (;;) {
+        int at = optind, found = getopt_long(argc, argv, letters, list, NULL);
+        if (found == -1) break;
+        if (found == ':') return misuse(err, "%s wants a value%s", argv[optind - 1], "");
+        if (found == '?') return misuse(err, "%s is no option of `instantpoints %s`", argv[at], commands[command].name);
+        for (int i = 0; i < OPTION_COUNT; i++) {
+            if (found != 256 + i && (found != options[i].letter || found == 0)) continue;
+            const char *value = options[i].value != NULL ? optarg : "";
+            if (!options[i].read(&o, value)) {
+                char name[64];
+                snprintf(name, sizeof name, "--%s %s", options[i].name, options[i].value != NULL ? options[i].value : "");
+                return misuse(err, "\"%s\" does not fit %s", value, name);
+            }
+            break;
+        }
+    }
+    o.paths = (const char *const *)(argv + optind);
+    o.path_count = (size_t)(argc - optind);
+    *out = o;
+    return true;
+}
+
+char *cli_help(void)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    if (f == NULL) return NULL;
+    fprintf(f, "Instant Points %s: any amount of raw laser-scan points, at once\n\n"
+               "usage: instantpoints COMMAND ...\n\n", IPTS_VERSION);
+    for (int c = 0; c < CLI_COMMANDS; c++)
+        fprintf(f, "  %-6s %-26s %s\n", commands[c].name, commands[c].arguments, commands[c].purpose);
+    fprintf(f, "\n`instantpoints help COMMAND` has the options. Exit codes: 0 done, 1 failed, 2 wrong use,\n"
+               "3 done, but some input was left out (it is named).\n");
+    fclose(f);
+    return text;
+}
+
+char *cli_command_help(cli_command command)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    if (f == NULL) return NULL;
+    fprintf(f, "usage: instantpoints %s %s\n\n%c%s.\n%s\n", commands[command].name, commands[command].arguments,
+            toupper((unsigned char)commands[command].purpose[0]), commands[command].purpose + 1, commands[command].details);
+    for (int i = 0; i < OPTION_COUNT; i++) {
+        char left[64];
+        if (!(options[i].commands >> command & 1) || options[i].help == NULL) continue;
+        snprintf(left, sizeof left, "%c%c%s --%s%s%s", options[i].letter != 0 ? '-' : ' ',
+                 options[i].letter != 0 ? options[i].letter : ' ', options[i].letter != 0 ? "," : " ", options[i].name,
+                 options[i].value != NULL ? " " : "", options[i].value != NULL ? options[i].value : "");
+        fprintf(f, "  %-26s %s\n", left, options[i].help);
+    }
+    fclose(f);
+    return text;
+}

@@ -1,0 +1,19 @@
+/* cli_report.h - what a job says when it is done: words for people, or JSON. */
+#pragma once
+#include "mospt/check.h"
+#include "mospt/survey.h"
+#include "preprocess/build.h"
+
+#include <stdio.h>
+
+/* Files left out, damaged and unknown, one line each, to standard error. */
+void cli_report_losses(const prep_build_result *result);
+
+void cli_report_build(FILE *out, const char *output, const prep_build_result *result);
+void cli_report_build_json(FILE *out, const char *output, const prep_build_result *result);
+
+/* points, spt: NULL where they were not looked at */
+void cli_report_info(FILE *out, const mospt_dataset *dataset, const mospt_tree_figures *tree,
+                     const mospt_point_figures *points, const mospt_spt_figures *spt);
+void cli_report_info_json(FILE *out, const mospt_dataset *dataset, const mospt_tree_figures *tree,
+                          const mospt_point_figures *points, const mospt_spt_figures *spt);

@@ -1,0 +1,207 @@
+/* main.c - the front door: subcommands, options, exit codes. */
+#include "cli_options.h"
+#include "cli_progress.h"
+#include "cli_report.h"
+
+#include <jansson.h>
+#include <malloc.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { EXIT_DONE = 0, EXIT_FAILED = 1, EXIT_WRONG_USE = 2, EXIT_LEFT_OUT = 3 };
+
+/* Datasets up to this size are read whole by a plain `info`: about a second. */
+static const uint64_t INFO_READS_POINTS = 8000000;
+
+static volatile sig_atomic_t stop_asked; /* set by the signal handler, read by whoever can stop */
+
+static void ask_to_stop(int number)
+{
+    (void)number;
+    stop_asked = 1;
+}
+
+static int fail(const mospt_err *err)
+{
+    char text[2048];
+    mospt_err_text(err, text, sizeof text);
+    fprintf(stderr, "instantpoints: %s\n", text);
+    return EXIT_FAILED;
+}
+
+static int misuse(cli_command command, const char *what)
+{
+    fprintf(stderr, "instantpoints %s: %s (`instantpoints help %s`)\n", cli_command_name(command), what, cli_command_name(command));
+    return EXIT_WRONG_USE;
+}
+
+static bool on_build_progress(void *context, const prep_progress *now)
+{
+    cli_progress_build(context, now);
+    return !stop_asked;
+}
+
+static void on_build_announce(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
+{
+    const cli_progress *progress = context;
+    if (progress->quiet) return;
+    fprintf(stderr, "%.1f M points: the dataset takes %.0f MB", (double)points / 1e6, (double)output_bytes / 1e6);
+    if (scratch_bytes > 0) fprintf(stderr, ", and up to %.0f MB of scratch space", (double)scratch_bytes / 1e6);
+    fprintf(stderr, "\n");
+}
+
+static int build_to(const cli_options *o, const char *output, bool words, mospt_err *err)
+{
+    prep_build_result result;
+    cli_progress progress;
+    cli_progress_start(&progress, o->quiet);
+    const prep_build_options options = {
+        .inputs = o->paths, .input_count = o->path_count, .output = output, .temp_dir = o->temp_dir, .force = o->force,
+        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .columns = o->columns,
+        .progress = on_build_progress, .announce = on_build_announce, .context = &progress,
+    };
+    bool ok = prep_build(&options, &result, err);
+    cli_progress_end(&progress);
+    if (ok || result.source.left_out_count > 1) cli_report_losses(&result);
+    if (ok && o->json && words) cli_report_build_json(stdout, output, &result);
+    else if (ok && words) cli_report_build(stdout, output, &result);
+    int code = !ok ? EXIT_FAILED : prep_build_left_something_out(&result) ? EXIT_LEFT_OUT : EXIT_DONE;
+    prep_build_result_fini(&result);
+    return code;
+}
+
+static int command_build(const cli_options *o)
+{
+    mospt_err err = {0};
+    if (o->path_count == 0) return misuse(o->command, "which scans?");
+    if (o->output == NULL) return misuse(o->command, "where to? -o NAME.ipts says it");
+    int code = build_to(o, o->output, true, &err);
+    return code == EXIT_FAILED ? fail(&err) : code;
+}
+
+static int command_info(const cli_options *o)
+{
+    mospt_err err = {0};
+    mospt_dataset *dataset = NULL;
+    mospt_tree_figures tree;
+    mospt_point_figures *points = NULL;
+    mospt_spt_figures spt;
+    int code = EXIT_FAILED;
+    if (o->path_count != 1) return misuse(o->command, "one dataset is wanted");
+    if (!mospt_dataset_open(o->paths[0], &dataset, &err)) return fail(&err);
+    bool read = o->stats || dataset->metadata.point_count <= INFO_READS_POINTS;
+    if (o->stats && (points = malloc(sizeof *points)) == NULL) {
+        mospt_err_nomem(&err, sizeof *points);
+    } else if (mospt_survey_tree(dataset, &tree, &err) && (!read || mospt_survey_points(dataset, points, &spt, &err))) {
+        if (o->json) cli_report_info_json(stdout, dataset, &tree, points, read ? &spt : NULL);
+        else cli_report_info(stdout, dataset, &tree, points, read ? &spt : NULL);
+        code = EXIT_DONE;
+    }
+    if (code != EXIT_DONE) fail(&err);
+    free(points);
+    mospt_dataset_close(dataset);
+    return code;
+}
+
+typedef struct {
+    cli_progress progress;
+    json_t *findings;
+} check_context;
+
+static void on_finding(void *context, const mospt_err *what)
+{
+    check_context *c = context;
+    char text[2048];
+    cli_progress_end(&c->progress);
+    fail(what);
+    mospt_err_text(what, text, sizeof text);
+    json_array_append_new(c->findings, json_string(text));
+}
+
+static bool on_check_progress(void *context, uint32_t done, uint32_t total)
+{
+    check_context *c = context;
+    cli_progress_share(&c->progress, "checking", done, total);
+    return !stop_asked;
+}
+
+static int command_check(const cli_options *o)
+{
+    mospt_err err = {0};
+    mospt_dataset *dataset = NULL;
+    mospt_check_result result = {0};
+    if (o->path_count != 1) return misuse(o->command, "one dataset is wanted");
+    check_context context = {.findings = json_array()};
+    const mospt_check_options options = {.found = on_finding, .progress = on_check_progress, .context = &context};
+    cli_progress_start(&context.progress, o->quiet);
+    bool looked = mospt_dataset_open(o->paths[0], &dataset, &err);
+    if (!looked) {
+        on_finding(&context, &err);
+        result.findings = 1;
+    } else {
+        looked = mospt_check(dataset, &options, &result, &err);
+        cli_progress_end(&context.progress);
+        if (!looked) fail(&err);
+    }
+    bool good = looked && result.findings == 0;
+    if (o->json) {
+        json_t *json = json_pack("{s:b, s:I, s:I, s:O}", "ok", (int)good, "points", (json_int_t)result.points, "nodes",
+                                 (json_int_t)(looked && dataset != NULL ? dataset->hierarchy.count : 0), "findings", context.findings);
+        json_dumpf(json, stdout, JSON_INDENT(2));
+        putchar('\n');
+        json_decref(json);
+    } else if (good) {
+        printf("%s: %llu points in %u nodes are all there and right\n", o->paths[0], (unsigned long long)result.points,
+               dataset->hierarchy.count);
+    } else if (result.findings > 0) {
+        printf("%s: %llu finding%s\n", o->paths[0], (unsigned long long)result.findings, result.findings == 1 ? "" : "s");
+    }
+    json_decref(context.findings);
+    mospt_dataset_close(dataset);
+    return good ? EXIT_DONE : EXIT_FAILED;
+}
+
+static int print_help(char *text, FILE *out)
+{
+    if (text != NULL) fputs(text, out);
+    free(text);
+    return out == stdout ? EXIT_DONE : EXIT_WRONG_USE;
+}
+
+static int help(int argc, char **argv)
+{
+    cli_command command;
+    if (argc > 2 && cli_command_from_name(argv[2], &command)) return print_help(cli_command_help(command), stdout);
+    if (argc <= 2) return print_help(cli_help(), stdout);
+    fprintf(stderr, "instantpoints: there is no command %s\n", argv[2]);
+    return EXIT_WRONG_USE;
+}
+
+int main(int argc, char **argv)
+{
+    static int (*const run[CLI_COMMANDS])(const cli_options *) = {
+        [CLI_BUILD] = command_build, [CLI_INFO] = command_info, [CLI_CHECK] = command_check,
+    };
+    cli_command command;
+    cli_options options;
+    mospt_err err = {0};
+    struct sigaction action = {.sa_handler = ask_to_stop, .sa_flags = (int)SA_RESETHAND};
+
+    /* Large buffers go back to the system when they are freed: the memory limit is that of the process. */
+    mallopt(M_MMAP_THRESHOLD, 64 << 10);
+    if (argc < 2) return print_help(cli_help(), stderr);
+    if (strcmp(argv[1], "help") == 0 || strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) return help(argc, argv);
+    if (strcmp(argv[1], "--version") == 0) return printf("instantpoints %s\n", IPTS_VERSION), EXIT_DONE;
+    if (!cli_command_from_name(argv[1], &command)) {
+        fprintf(stderr, "instantpoints: there is no command %s (`instantpoints help`)\n", argv[1]);
+        return EXIT_WRONG_USE;
+    }
+    if (!cli_options_read(command, argc - 1, argv + 1, &options, &err)) return misuse(command, err.message);
+    if (options.help) return print_help(cli_command_help(command), stdout);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    return run[command](&options);
+}

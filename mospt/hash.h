@@ -1,0 +1,9 @@
+/* mospt/hash.h - the one hash of all files and points: XXH3, 64 bits, seed 0. */
+#pragma once
+#include <stddef.h>
+#include <stdint.h>
+
+uint64_t mospt_hash(const void *bytes, size_t size);
+
+/* Sum modulo 2^64 of the hash of each record: does not depend on their order. */
+uint64_t mospt_hash_records(const uint8_t *records, size_t stride, size_t count);

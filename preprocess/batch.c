@@ -1,0 +1,50 @@
+#include "preprocess/batch.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t capacity, mospt_err *err)
+{
+    prep_batch b = {.capacity = capacity, .plane_count = schema->count};
+    bool ok = true;
+    b.xyz = malloc(capacity * 3 * sizeof *b.xyz);
+    b.rgbi = malloc((size_t)capacity * 4);
+    ok = b.xyz != NULL && b.rgbi != NULL;
+    for (uint32_t k = 0; k < schema->count; k++) {
+        b.plane_size[k] = mospt_attribute_size(&schema->at[k]);
+        b.plane[k] = malloc(capacity * b.plane_size[k]);
+        ok = ok && b.plane[k] != NULL;
+    }
+    if (!ok) {
+        prep_batch_fini(&b);
+        return mospt_err_nomem(err, (size_t)capacity * (28 + schema->row_size));
+    }
+    *batch = b;
+    return true;
+}
+
+void prep_batch_fini(prep_batch *batch)
+{
+    free(batch->xyz);
+    free(batch->rgbi);
+    for (uint32_t k = 0; k < batch->plane_count; k++) free(batch->plane[k]);
+    *batch = (prep_batch){0};
+}
+
+void prep_batch_compact(prep_batch *batch, const uint8_t *keep)
+{
+    uint32_t out = 0;
+    for (uint32_t i = 0; i < batch->count; i++) {
+        if (!keep[i]) continue;
+        if (out != i) {
+            memcpy(batch->xyz + 3 * (size_t)out, batch->xyz + 3 * (size_t)i, 3 * sizeof *batch->xyz);
+            memcpy(batch->rgbi + 4 * (size_t)out, batch->rgbi + 4 * (size_t)i, 4);
+            for (uint32_t k = 0; k < batch->plane_count; k++) {
+                size_t s = batch->plane_size[k];
+                memcpy(batch->plane[k] + out * s, batch->plane[k] + i * s, s);
+            }
+        }
+        out++;
+    }
+    batch->count = out;
+}

@@ -1,0 +1,467 @@
+#include "preprocess/build.h"
+
+#include "mospt/file.h"
+#include "preprocess/pack.h"
+#include "preprocess/pass.h"
+#include "preprocess/plan.h"
+
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { INNER_DEPTH_DEFAULT = 7, PACK_SLICE = 8192 };
+
+typedef struct {
+    const prep_build_options *options;
+    prep_build_result *result;
+    prep_workers *workers;
+    prep_plan plan;
+    prep_shape shape;
+    mospt_metadata *metadata; /* of the result */
+    prep_store *store;
+    mospt_writer *writer;
+    prep_written written;
+    prep_phase phase;
+    uint64_t points_total;    /* 0: unknown */
+    double phase_start;
+    char *scratch_folder;     /* owned */
+    char *target;             /* owned: the folder written to */
+} build;
+
+const char *prep_phase_name(prep_phase phase)
+{
+    static const char *const names[PREP_PHASES] = {"measuring", "reading", "building"};
+    return names[phase];
+}
+
+static double now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void enter(build *b, prep_phase phase)
+{
+    double t = now();
+    b->result->seconds[b->phase] += t - b->phase_start;
+    b->phase = phase;
+    b->phase_start = t;
+}
+
+static bool tell(build *b, uint64_t points)
+{
+    if (b->options->progress == NULL) return true;
+    prep_progress p = {.phase = b->phase, .points = points, .points_total = b->points_total, .share = -1};
+    p.scratch_bytes = b->store != NULL ? prep_store_scratch_peak(b->store) : b->result->source.spool_size;
+    /* Reading and building each take about half of the time. */
+    if (b->points_total > 0 && b->phase != PREP_PHASE_MEASURE)
+        p.share = 0.5 * (double)points / (double)b->points_total + (b->phase == PREP_PHASE_WRITE ? 0.5 : 0);
+    return b->options->progress(b->options->context, &p);
+}
+
+static bool tell_points(void *context, uint64_t points)
+{
+    return tell(context, points);
+}
+
+static bool tell_written(void *context, const prep_written *written)
+{
+    return tell(context, written->points);
+}
+
+/* The folder that holds a path, as an owned string. */
+static char *folder_of(const char *path)
+{
+    char *folder = strdup(path);
+    if (folder == NULL) return NULL;
+    size_t n = strlen(folder);
+    while (n > 1 && folder[n - 1] == '/') folder[--n] = '\0';
+    char *slash = strrchr(folder, '/');
+    if (slash == folder) folder[1] = '\0';
+    else if (slash != NULL) *slash = '\0';
+    else strcpy(folder, n > 0 ? "." : "");
+    if (n == 1 && slash == NULL) strcpy(folder, ".");
+    return folder;
+}
+
+/* Where the dataset is written: the output itself, or beside it where that is to be replaced at the end. */
+static bool choose_folders(build *b, mospt_err *err)
+{
+    const prep_build_options *o = b->options;
+    size_t n = strlen(o->output);
+    while (n > 1 && o->output[n - 1] == '/') n--;
+    if (mospt_dataset_exists(o->output) && !o->force)
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output), "is a dataset already; --force replaces it");
+    b->target = malloc(n + 5);
+    b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : folder_of(o->output);
+    if (b->target == NULL || b->scratch_folder == NULL) return mospt_err_nomem(err, n);
+    memcpy(b->target, o->output, n);
+    strcpy(b->target + n, mospt_dataset_exists(o->output) ? ".new" : "");
+    if (access(b->scratch_folder, W_OK | X_OK) != 0)
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
+    return true;
+}
+
+static bool make_schema(build *b, mospt_err *err)
+{
+    mospt_schema *schema = &b->metadata->schema;
+    const prep_source *source = &b->result->source;
+    *schema = (mospt_schema){0};
+    if (!mospt_schema_add(schema, "scan", source->scan_count > UINT16_MAX ? MOSPT_U32 : MOSPT_U16, 1, err)) return false;
+    for (uint32_t i = 0; i < source->scan_count; i++) {
+        const mospt_schema *planes = &source->scans[i].info.attributes;
+        for (uint32_t k = 0; k < planes->count; k++)
+            if (!mospt_schema_add(schema, planes->at[k].name, planes->at[k].type, planes->at[k].components, err)) {
+                if (err != NULL && err->file[0] == '\0')
+                    snprintf(err->file, sizeof err->file, "%s", source->scans[i].path);
+                return false;
+            }
+    }
+    return true;
+}
+
+/* The step is that of the finest LAS file; floating-point scans beside it ask for a step of its size divided by a power of
+ * two, so that the positions of both are kept. */
+static bool make_grid(build *b, mospt_err *err)
+{
+    const prep_source *source = &b->result->source;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double step = 0, extent = 0;
+    const double *offset = NULL;
+    bool any_float = false;
+    for (uint32_t i = 0; i < source->scan_count; i++) {
+        const prep_scan_info *info = &source->scans[i].info;
+        for (int a = 0; a < 3; a++) low[a] = fmin(low[a], info->low[a]), high[a] = fmax(high[a], info->high[a]);
+        if (info->step > 0) {
+            if (step == 0 || info->step < step) step = info->step;
+            if (offset == NULL) offset = info->offset;
+        } else {
+            any_float = true;
+        }
+    }
+    for (int a = 0; a < 3; a++) extent = fmax(extent, high[a] - low[a]);
+    while (any_float && step > 0 && extent > 0 && step > ldexp(extent, -30)) step /= 2;
+    return mospt_grid_make(low, high, step, offset, &b->metadata->grid, err);
+}
+
+static bool check_space(const char *folder, uint64_t needed, const char *what, mospt_err *err)
+{
+    struct statvfs disk;
+    if (statvfs(folder, &disk) != 0) return true; /* then writing will tell */
+    uint64_t left = (uint64_t)disk.f_bavail * disk.f_frsize;
+    if (left >= needed) return true;
+    return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(folder),
+                         "%s takes up to %.1f MB there, and %.1f MB are free%s", what, (double)needed / 1e6,
+                         (double)left / 1e6, strcmp(what, "scratch space") == 0 ? "; --temp-dir names another disk" : "");
+}
+
+/* Says how much disk will be needed, and stops where it is not there. */
+static bool check_disks(build *b, mospt_err *err)
+{
+    uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema), scratch = bytes + bytes / 16;
+    if (bytes < b->plan.store_memory) scratch = 0;
+    if (b->options->announce != NULL)
+        b->options->announce(b->options->context, b->points_total, scratch + b->result->source.spool_size, bytes);
+    if (!check_space(b->scratch_folder, scratch, "scratch space", err)) return false;
+    char *folder = folder_of(b->target);
+    bool ok = folder != NULL && check_space(folder, bytes, "the dataset", err);
+    free(folder);
+    return ok;
+}
+
+typedef struct {
+    const prep_batch *batch;
+    prep_packer packer;
+    uint8_t *records;
+    prep_pack_sums *sums; /* [slices] */
+} pack_job;
+
+static void pack_slice(void *context, uint32_t slice)
+{
+    pack_job *job = context;
+    uint32_t begin = slice * PACK_SLICE, end = begin + PACK_SLICE;
+    job->sums[slice] = prep_pack_sums_empty;
+    prep_pack(&job->packer, job->batch, begin, end < job->batch->count ? end : job->batch->count, job->records,
+              &job->sums[slice]);
+}
+
+/* Packs a batch with all workers. */
+static prep_pack_sums pack_batch(build *b, const prep_batch *batch, uint32_t scan, uint8_t *records,
+                                 prep_pack_sums *slice_sums)
+{
+    prep_pack_sums sums = prep_pack_sums_empty;
+    uint32_t slices = (batch->count + PACK_SLICE - 1) / PACK_SLICE;
+    pack_job job = {.batch = batch, .records = records, .sums = slice_sums,
+                    .packer = {.grid = &b->metadata->grid, .schema = &b->metadata->schema,
+                               .planes = &b->result->source.scans[scan].info.attributes, .scan = scan}};
+    prep_workers_run(b->workers, slices, pack_slice, &job);
+    for (uint32_t i = 0; i < slices; i++) prep_pack_sums_add(&sums, &slice_sums[i]);
+    return sums;
+}
+
+/* Streams all scans through the first pass.
+ * outside  out: a point was outside the root cube, which header bounds have promised not to happen; start again */
+static bool stream_points(build *b, prep_pass *pass, prep_pack_sums *of_scan, bool *outside, mospt_err *err)
+{
+    prep_source *source = &b->result->source;
+    uint32_t room = b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count : PREP_BATCH_CAPACITY;
+    prep_stream *stream = NULL;
+    uint8_t *records = malloc(room * mospt_record_size(&b->metadata->schema));
+    prep_pack_sums *sums = malloc((room / PACK_SLICE + 1) * sizeof *sums);
+    uint64_t points = 0;
+    bool ok = records != NULL && sums != NULL;
+    if (!ok) mospt_err_nomem(err, room * mospt_record_size(&b->metadata->schema));
+    ok = ok && prep_stream_open(source, b->plan.batch_count, &stream, err);
+    while (ok && !*outside) {
+        const prep_batch *batch;
+        uint32_t scan = 0;
+        ok = prep_stream_next(stream, &batch, &scan, err);
+        if (!ok || batch == NULL) break;
+        prep_pack_sums packed = pack_batch(b, batch, scan, records, sums);
+        *outside = packed.outside;
+        if (packed.outside) break;
+        prep_pack_sums_add(&of_scan[scan], &packed);
+        points += batch->count;
+        ok = prep_pass_insert(pass, records, batch->count, err);
+        if (ok && !tell(b, points)) ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
+    }
+    prep_stream_close(stream);
+    free(records), free(sums);
+    return ok;
+}
+
+static bool measure(build *b, bool all, mospt_err *err)
+{
+    prep_source *source = &b->result->source;
+    enter(b, PREP_PHASE_MEASURE);
+    b->points_total = 0;
+    if (!prep_source_measure(source, all, tell_points, b, err)) return false;
+    if (source->scan_count == 0) {
+        if (source->left_out_count == 1 && err != NULL) *err = source->left_out[0].err;
+        else mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point to build from: %u files were left out", source->left_out_count);
+        return false;
+    }
+    for (uint32_t i = 0; i < source->scan_count; i++) {
+        const prep_source_scan *scan = &source->scans[i];
+        b->points_total += scan->measured ? scan->points : scan->info.point_count;
+    }
+    return true;
+}
+
+/* One try at the whole tree. `*outside` as for stream_points(). */
+static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_err *err)
+{
+    bool ok = false;
+    prep_pass *pass = NULL;
+    size_t record_size = mospt_record_size(&b->metadata->schema);
+    b->shape = (prep_shape){.grid = &b->metadata->grid, .schema = &b->metadata->schema,
+                            .inner_depth = b->metadata->inner_depth, .add_threshold = b->metadata->add_threshold};
+    if (!prep_store_create(b->scratch_folder, record_size, b->plan.block_size, b->plan.store_memory, &b->store, err))
+        return false;
+    prep_pass_env env = {.shape = &b->shape, .workers = b->workers, .store = b->store, .writer = b->writer,
+                         .levels = b->plan.levels, .solve_memory = b->plan.solve_memory, .written = &b->written,
+                         .batch_count = b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count
+                                                                                 : PREP_BATCH_CAPACITY,
+                         .report = tell_written, .report_context = b};
+    enter(b, PREP_PHASE_READ);
+    ok = prep_pass_begin(&env, b->metadata->grid.root, 0, &pass, err) && stream_points(b, pass, of_scan, outside, err);
+    if (ok && !*outside) {
+        enter(b, PREP_PHASE_WRITE);
+        b->points_total = 0;
+        for (uint32_t i = 0; i < b->result->source.scan_count; i++) b->points_total += b->result->source.scans[i].points;
+        if (b->points_total == 0) {
+            prep_pass_abandon(pass);
+            ok = mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point could be read");
+        } else {
+            ok = prep_pass_end(pass, err);
+        }
+    } else {
+        prep_pass_abandon(pass);
+    }
+    b->result->scratch_bytes = prep_store_scratch_peak(b->store) + b->result->source.spool_size;
+    prep_store_destroy(b->store);
+    b->store = NULL;
+    return ok;
+}
+
+static bool fill_source(mospt_source *to, const prep_source_scan *from, const prep_pack_sums *sums,
+                        const mospt_grid *grid)
+{
+    bool several = from->info.scan_count > 1;
+    to->name = strdup(from->name);
+    to->scan = strdup(several ? from->info.name : "");
+    to->format = strdup(from->info.format);
+    to->points = from->points;
+    to->has_rgb = from->info.has_rgb;
+    to->has_intensity = from->info.has_intensity;
+    to->has_pose = from->info.has_pose;
+    memcpy(to->pose, from->info.pose, sizeof to->pose);
+    bool ok = to->name != NULL && to->scan != NULL && to->format != NULL;
+    for (int r = 0; r < PREP_DROP_REASONS; r++) {
+        if (from->dropped[r] == 0) continue;
+        to->drop_reason[to->reason_count] = strdup(prep_drop_name((prep_drop)r));
+        ok = ok && to->drop_reason[to->reason_count] != NULL;
+        to->drop_count[to->reason_count++] = from->dropped[r];
+        to->dropped += from->dropped[r];
+    }
+    if (from->damage.code != MOSPT_OK) {
+        char text[2048];
+        mospt_err_text(&from->damage, text, sizeof text);
+        /* The dataset speaks of its sources by their names, wherever the folder was. */
+        const char *after = strstr(text, from->path) == text ? text + strlen(from->path) : NULL;
+        char named[4096];
+        snprintf(named, sizeof named, "%s%s", after != NULL ? from->name : "", after != NULL ? after : text);
+        to->damage = strdup(named);
+        ok = ok && to->damage != NULL;
+    }
+    for (int a = 0; a < 3; a++) {
+        to->low[a] = mospt_grid_axis_to_world(grid, a, sums->low[a]);
+        to->high[a] = mospt_grid_axis_to_world(grid, a, sums->high[a]);
+    }
+    return ok;
+}
+
+static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *err)
+{
+    mospt_metadata *m = b->metadata;
+    const prep_source *source = &b->result->source;
+    prep_pack_sums all = prep_pack_sums_empty;
+    m->sources = calloc(source->scan_count, sizeof *m->sources);
+    if (m->sources == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *m->sources);
+    for (; m->source_count < source->scan_count; m->source_count++) {
+        uint32_t i = m->source_count;
+        prep_pack_sums_add(&all, &of_scan[i]);
+        if (!fill_source(&m->sources[i], &source->scans[i], &of_scan[i], &m->grid)) {
+            m->source_count++;
+            return mospt_err_nomem(err, sizeof *m->sources);
+        }
+    }
+    m->points_hash = all.hash;
+    m->position_error = all.position_error;
+    for (int a = 0; a < 3; a++) {
+        m->low[a] = mospt_grid_axis_to_world(&m->grid, a, all.low[a]);
+        m->high[a] = mospt_grid_axis_to_world(&m->grid, a, all.high[a]);
+    }
+    return true;
+}
+
+/* Conservation of points is not a hope: what was read is what was written. */
+static bool check_conservation(const build *b, const mospt_metadata *m, mospt_err *err)
+{
+    if (b->written.points == b->points_total && b->written.points_hash == m->points_hash) return true;
+    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(b->target),
+                         "%llu points were read and %llu written, with checksums %016llx and %016llx: this is an error of the program",
+                         (unsigned long long)b->points_total, (unsigned long long)b->written.points,
+                         (unsigned long long)m->points_hash, (unsigned long long)b->written.points_hash);
+}
+
+/* Puts the new dataset in the place of the old one, which is removed last. */
+static bool replace_output(build *b, mospt_err *err)
+{
+    size_t n = strlen(b->target);
+    if (strcmp(b->target + n - 4, ".new") != 0 || mospt_dataset_exists(b->options->output) == false) return true;
+    bool ok = false;
+    char *final = strndup(b->target, n - 4), *old = malloc(n + 1);
+    if (final == NULL || old == NULL) {
+        mospt_err_nomem(err, n);
+        goto done;
+    }
+    snprintf(old, n + 1, "%s.old", final);
+    if (!mospt_file_remove_tree(old, err)) goto done;
+    if (rename(final, old) != 0) {
+        mospt_err_set(err, MOSPT_EIO, mospt_at_file(final), "cannot be moved aside");
+        goto done;
+    }
+    if (rename(b->target, final) != 0) {
+        mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->target), "cannot be put in place; the old dataset is %s", old);
+        goto done;
+    }
+    ok = mospt_file_remove_tree(old, err);
+done:
+    free(final), free(old);
+    return ok;
+}
+
+static bool run(build *b, mospt_err *err)
+{
+    const prep_build_options *o = b->options;
+    prep_source *source = &b->result->source;
+    prep_scan_options scan_options = {.columns = o->columns};
+    long processors = sysconf(_SC_NPROCESSORS_ONLN);
+    uint32_t threads = o->threads > 0 ? o->threads : processors > 0 ? (uint32_t)processors : 1;
+    uint64_t memory = o->memory > 0 ? o->memory : prep_plan_machine_memory() / 4;
+    prep_pack_sums *of_scan = NULL;
+    bool ok = false, outside = false;
+
+    b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : INNER_DEPTH_DEFAULT;
+    b->metadata->add_threshold = PREP_ADD_THRESHOLD;
+    if (!choose_folders(b, err)) return false;
+    if (!prep_folder_list_make(o->inputs, o->input_count, &b->result->files, err)) return false;
+    if (!prep_source_open(&b->result->files, &scan_options, b->scratch_folder, source, err)) return false;
+    if (!measure(b, false, err)) return false;
+    if (!make_schema(b, err)) return false;
+    if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth, &b->plan, err))
+        return false;
+    if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
+    if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
+
+    of_scan = malloc(source->scan_count * sizeof *of_scan);
+    if (of_scan == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *of_scan);
+    for (int attempt = 0; attempt == 0 || outside; attempt++) {
+        /* Bounds that lie: measure all scans, and start again with what they really are. */
+        if (outside && !measure(b, true, err)) goto done;
+        for (uint32_t i = 0; i < source->scan_count; i++) of_scan[i] = prep_pack_sums_empty;
+        outside = false;
+        if (!make_grid(b, err) || !build_tree(b, of_scan, &outside, err)) goto done;
+        if (outside && attempt > 0) {
+            mospt_err_set(err, MOSPT_EIO, mospt_nowhere(), "the scans changed while they were read");
+            goto done;
+        }
+    }
+    ok = fill_metadata(b, of_scan, err) && check_conservation(b, b->metadata, err);
+    b->result->node_count = mospt_writer_nodes(b->writer);
+    b->result->payload_bytes = mospt_writer_bytes(b->writer);
+    ok = ok && mospt_writer_commit(b->writer, b->metadata, err) && replace_output(b, err);
+    b->result->level_count = b->metadata->file_count;
+done:
+    free(of_scan);
+    return ok;
+}
+
+bool prep_build(const prep_build_options *options, prep_build_result *out, mospt_err *err)
+{
+    double start = now();
+    struct rusage usage;
+    *out = (prep_build_result){.source = {.spool_fd = -1}};
+    build b = {.options = options, .result = out, .metadata = &out->metadata, .phase_start = start};
+    bool ok = run(&b, err);
+    enter(&b, PREP_PHASE_MEASURE);
+    out->total_seconds = now() - start;
+    if (getrusage(RUSAGE_SELF, &usage) == 0) out->peak_memory = (uint64_t)usage.ru_maxrss * 1024;
+    mospt_writer_destroy(b.writer);
+    prep_workers_destroy(b.workers);
+    free(b.scratch_folder), free(b.target);
+    return ok;
+}
+
+void prep_build_result_fini(prep_build_result *result)
+{
+    mospt_metadata_fini(&result->metadata);
+    prep_source_close(&result->source);
+    prep_folder_list_fini(&result->files);
+}
+
+bool prep_build_left_something_out(const prep_build_result *result)
+{
+    if (result->source.left_out_count > 0) return true;
+    for (uint32_t i = 0; i < result->source.scan_count; i++)
+        if (result->source.scans[i].damage.code != MOSPT_OK) return true;
+    return false;
+}

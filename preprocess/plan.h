@@ -1,0 +1,21 @@
+/* preprocess/plan.h - how the memory that the builder was given is divided. */
+#pragma once
+#include "mospt/err.h"
+
+enum { PREP_MEMORY_MIN_MIB = 64 };
+
+typedef struct {
+    uint32_t levels;      /* of the outer octree that one pass fills */
+    uint32_t batch_count; /* records per batch */
+    size_t block_size;    /* of spools, bytes */
+    size_t store_memory;  /* bytes of full blocks that stay in memory */
+    size_t solve_memory;  /* bytes for rejection files being finished */
+} prep_plan;
+
+/* Memory of this machine, bytes. */
+uint64_t prep_plan_machine_memory(void);
+
+/* Divides `memory` bytes, the peak of the whole process.
+ * record_size  bytes of a point with its attributes
+ * errors       MOSPT_EINVAL: too little, with the least that would do */
+bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out, mospt_err *err);

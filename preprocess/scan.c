@@ -1,0 +1,268 @@
+#include "preprocess/scan.h"
+
+#include "preprocess/las.h"
+#include "preprocess/ply.h"
+#include "preprocess/scan_format.h"
+#include "preprocess/text.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* Doubles this far from zero are no longer coordinates in metres: their own steps are coarser than a decimetre. */
+static const double COORDINATE_MAX = 1e15;
+
+const char *prep_drop_name(prep_drop reason)
+{
+    static const char *const names[PREP_DROP_REASONS] = {"not finite", "out of range", "no return", "unreadable"};
+    return reason < PREP_DROP_REASONS ? names[reason] : "unknown";
+}
+
+void prep_scan_set_damage(prep_scan *scan, mospt_where where, const char *format, ...)
+{
+    if (scan->is_damaged) return;
+    char text[sizeof scan->damage.message];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    mospt_err_set(&scan->damage, MOSPT_EFORMAT, where, "%s", text);
+    scan->is_damaged = true;
+}
+
+/* Names come from files: what a terminal or JSON could choke on becomes an underscore. */
+static void clean_name(const char *name, char out[MOSPT_ATTRIBUTE_NAME_MAX])
+{
+    size_t n = 0;
+    for (; name[n] != '\0' && n + 1 < MOSPT_ATTRIBUTE_NAME_MAX; n++)
+        out[n] = (name[n] > ' ' && name[n] < 127 && name[n] != '"' && name[n] != '\\') ? name[n] : '_';
+    while (n > 0 && out[n - 1] == '_') n--;
+    out[n] = '\0';
+    if (n == 0) memcpy(out, "unnamed", 8);
+}
+
+int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type, uint32_t components)
+{
+    mospt_schema *schema = &scan->info.attributes;
+    char base[MOSPT_ATTRIBUTE_NAME_MAX], unique[MOSPT_ATTRIBUTE_NAME_MAX];
+    clean_name(name, base);
+    memcpy(unique, base, sizeof unique);
+    for (int n = 2; mospt_schema_find(schema, unique) >= 0; n++)
+        snprintf(unique, sizeof unique, "%.36s_%d", base, n);
+    if (!mospt_schema_add(schema, unique, type, components, NULL)) return -1;
+    return (int)schema->count - 1;
+}
+
+static bool has_extension(const char *path, const char *extension)
+{
+    size_t n = strlen(path), m = strlen(extension);
+    return n > m && path[n - m - 1] == '.' && strcasecmp(path + n - m, extension) == 0;
+}
+
+static bool starts_with(const uint8_t *head, size_t size, const char *text)
+{
+    size_t n = strlen(text);
+    return size >= n && memcmp(head, text, n) == 0;
+}
+
+/* Reads past one line; returns how many numbers stand on it, or -1 if anything else does. */
+static int count_numbers(const char **text)
+{
+    int count = 0;
+    const char *p = *text;
+    while (*p != '\n' && *p != '\0') {
+        size_t blank = strspn(p, " \t\r");
+        size_t number = strspn(p + blank, "+-.0123456789eE");
+        if (blank + number == 0) {
+            count = -1;
+            p += strcspn(p, "\n");
+            break;
+        }
+        count += number > 0 && count >= 0;
+        p += blank + number;
+    }
+    *text = *p == '\n' ? p + 1 : p;
+    return count;
+}
+
+/* PTX has no signature, but it opens with columns, rows, the scanner's position, three axes and a 4 x 4 matrix. */
+static bool looks_like_ptx(const uint8_t *head, size_t size)
+{
+    static const int shape[10] = {1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
+    char text[1024];
+    size_t n = size < sizeof text - 1 ? size : sizeof text - 1;
+    memcpy(text, head, n);
+    text[n] = '\0';
+    const char *p = text;
+    for (int i = 0; i < 10; i++) {
+        if (count_numbers(&p) != shape[i]) return false;
+    }
+    return true;
+}
+
+static bool looks_like_pcd(const uint8_t *head, size_t size)
+{
+    if (starts_with(head, size, "# .PCD")) return true;
+    return starts_with(head, size, "VERSION ") && memmem(head, size, "\nFIELDS ", 8) != NULL;
+}
+
+static bool is_binary(const uint8_t *head, size_t size)
+{
+    for (size_t i = 0; i < size; i++) {
+        if (head[i] < 32 && !isspace(head[i]) && head[i] != 26) return true;
+    }
+    return false;
+}
+
+prep_file_kind prep_scan_recognise(const char *path, const uint8_t *head, size_t size)
+{
+    static const struct {
+        const char *extension;
+        prep_file_kind kind;
+    } names[] = {{"las", PREP_FILE_LAS}, {"laz", PREP_FILE_LAS},    {"ply", PREP_FILE_PLY}, {"ply.gz", PREP_FILE_PLY},
+                 {"e57", PREP_FILE_E57}, {"pcd", PREP_FILE_PCD}, {"ptx", PREP_FILE_PTX}};
+    if (starts_with(head, size, "LASF")) return PREP_FILE_LAS;
+    if (starts_with(head, size, "ASTM-E57")) return PREP_FILE_E57;
+    if (starts_with(head, size, "ply") && size > 3 && isspace(head[3])) return PREP_FILE_PLY;
+    if (looks_like_pcd(head, size)) return PREP_FILE_PCD;
+    if (looks_like_ptx(head, size)) return PREP_FILE_PTX;
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        if (has_extension(path, names[i].extension)) return names[i].kind;
+    }
+    return is_binary(head, size) ? PREP_FILE_BINARY : PREP_FILE_TEXT;
+}
+
+static bool choose_format(prep_scan *scan, mospt_err *err)
+{
+    uint8_t head[PREP_HEAD_SIZE];
+    size_t got;
+    mospt_where where = mospt_at_file(scan->path);
+    if (!prep_input_read(scan->input, head, sizeof head, &got, err)) return false;
+    if (!prep_input_seek(scan->input, 0, err)) return false;
+    if (got == 0) {
+        const char *fault = prep_input_fault(scan->input);
+        return mospt_err_set(err, MOSPT_EFORMAT, where, "%s", fault != NULL ? fault : "the file is empty (0 bytes)");
+    }
+    switch (prep_scan_recognise(scan->path, head, got)) {
+    case PREP_FILE_LAS:
+        scan->format = &prep_las_format;
+        return true;
+    case PREP_FILE_PLY:
+        scan->format = &prep_ply_format;
+        return true;
+    case PREP_FILE_TEXT:
+        scan->format = &prep_text_format;
+        return true;
+    case PREP_FILE_E57:
+        return mospt_err_set(err, MOSPT_EFORMAT, where, "E57 is not read yet");
+    case PREP_FILE_PCD:
+        return mospt_err_set(err, MOSPT_EFORMAT, where, "PCD is not read yet");
+    case PREP_FILE_PTX:
+        return mospt_err_set(err, MOSPT_EFORMAT, where, "PTX is not read yet");
+    case PREP_FILE_BINARY:
+        break;
+    }
+    return mospt_err_set(err, MOSPT_EFORMAT, where, "binary data, but no scan format that this program knows");
+}
+
+bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *options, prep_scan **out,
+                    mospt_err *err)
+{
+    static const prep_scan_options defaults = {0};
+    prep_scan *scan = calloc(1, sizeof *scan);
+    if (scan == NULL) return mospt_err_nomem(err, sizeof *scan);
+    if (!prep_input_open(path, &scan->input, err)) goto fail;
+    scan->path = prep_input_path(scan->input);
+
+    const char *slash = strrchr(path, '/');
+    snprintf(scan->info.name, sizeof scan->info.name, "%s", slash != NULL ? slash + 1 : path);
+    scan->info.scan_count = 1;
+    if (!choose_format(scan, err)) goto fail;
+    if (!scan->format->open(scan, index, options != NULL ? options : &defaults, err)) goto fail;
+    if (index >= scan->info.scan_count) {
+        mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "scan %u of a file that holds %u", index,
+                      scan->info.scan_count);
+        goto fail;
+    }
+    scan->was_damaged_at_open = scan->is_damaged;
+    *out = scan;
+    return true;
+fail:
+    prep_scan_close(scan);
+    return false;
+}
+
+void prep_scan_close(prep_scan *scan)
+{
+    if (scan == NULL) return;
+    if (scan->format != NULL) scan->format->close(scan);
+    prep_input_close(scan->input);
+    free(scan->keep);
+    free(scan);
+}
+
+const prep_scan_info *prep_scan_describe(const prep_scan *scan)
+{
+    return &scan->info;
+}
+
+/* 0 for a coordinate triple that can be kept; NaN fails every comparison, so that it takes the slow path too. */
+static bool is_in_range(const double *xyz)
+{
+    return fabs(xyz[0]) <= COORDINATE_MAX && fabs(xyz[1]) <= COORDINATE_MAX && fabs(xyz[2]) <= COORDINATE_MAX;
+}
+
+static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
+{
+    uint32_t first = 0;
+    while (first < batch->count && is_in_range(batch->xyz + 3 * (size_t)first)) first++;
+    if (first == batch->count) return true;
+
+    if (scan->keep_capacity < batch->count) {
+        free(scan->keep);
+        scan->keep = malloc(batch->capacity);
+        scan->keep_capacity = scan->keep != NULL ? batch->capacity : 0;
+        if (scan->keep == NULL) return mospt_err_nomem(err, batch->capacity);
+    }
+    for (uint32_t i = 0; i < batch->count; i++) {
+        const double *p = batch->xyz + 3 * (size_t)i;
+        scan->keep[i] = is_in_range(p);
+        if (scan->keep[i]) continue;
+        bool is_finite = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
+        scan->dropped[is_finite ? PREP_DROP_OUT_OF_RANGE : PREP_DROP_NOT_FINITE]++;
+    }
+    prep_batch_compact(batch, scan->keep);
+    return true;
+}
+
+bool prep_scan_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
+{
+    do {
+        batch->count = 0;
+        if (!scan->format->read(scan, batch, err)) return false;
+        if (batch->count == 0) return true;
+        if (!drop_unusable(scan, batch, err)) return false;
+    } while (batch->count == 0);
+    return true;
+}
+
+bool prep_scan_rewind(prep_scan *scan, mospt_err *err)
+{
+    memset(scan->dropped, 0, sizeof scan->dropped);
+    if (!scan->was_damaged_at_open) scan->is_damaged = false;
+    return scan->format->rewind(scan, err);
+}
+
+const uint64_t *prep_scan_dropped(const prep_scan *scan)
+{
+    return scan->dropped;
+}
+
+const mospt_err *prep_scan_damage(const prep_scan *scan)
+{
+    return scan->is_damaged ? &scan->damage : NULL;
+}

@@ -1,0 +1,33 @@
+/* preprocess/tone.h - from raw measurements to the 8 bits that are shown.
+ *
+ * Scanners write intensity in any range (0..1, -2048..2047, 16 bits of which 300 are used), so the range to show is taken
+ * from a sample of the scan. The raw value is kept beside it as an attribute; nothing is lost by the choice made here. */
+#pragma once
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    bool is_flat; /* the sample holds one value only, or none: nothing to show */
+    double low, scale; /* shown = (value - low) * scale, rounded and clamped */
+} prep_tone;
+
+/* Chooses the range: integers up to 255 are shown as they are, all else is stretched between the 0.5 % and the 99.5 %
+ * percentile, so that a single mirror reflection does not darken the scan.
+ * values   [count], reordered; NaN and infinities are passed over */
+prep_tone prep_tone_make(double *values, size_t count);
+
+/* Number of samples that are enough to choose a range. */
+enum { PREP_TONE_SAMPLES = 16384 };
+
+static inline uint8_t prep_tone_apply(const prep_tone *tone, double value)
+{
+    double shown = (value - tone->low) * tone->scale + 0.5;
+    return shown >= 255 ? 255 : shown > 0 ? (uint8_t)shown : 0; /* NaN is 0 */
+}
+
+/* 16-bit colour to 8 bits, rounded to nearest. */
+static inline uint8_t prep_tone_from_16(uint32_t value)
+{
+    return (uint8_t)((value * 255 + 32767) / 65535);
+}
