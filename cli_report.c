@@ -48,6 +48,16 @@ void cli_report_losses(const prep_build_result *r)
     fprintf(stderr, "%s\n", r->files.unknown_count > UNKNOWN_SHOWN ? ", ..." : "");
 }
 
+void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
+{
+    char number[32], output[32], scratch[32];
+    bytes_text(output_bytes, output);
+    bytes_text(scratch_bytes, scratch);
+    fprintf(stderr, "%s points: the dataset takes %s", grouped(points, number), output);
+    if (scratch_bytes > 0) fprintf(stderr, ", and up to %s of scratch space", scratch);
+    fprintf(stderr, "\n");
+}
+
 static uint64_t points_dropped(const mospt_metadata *m)
 {
     uint64_t sum = 0;

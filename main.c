@@ -3,6 +3,10 @@
 #include "cli_progress.h"
 #include "cli_report.h"
 
+#include "mospt/file.h"
+#include "render/shot.h"
+#include "render/view.h"
+
 #include <jansson.h>
 #include <malloc.h>
 #include <signal.h>
@@ -47,10 +51,7 @@ static bool on_build_progress(void *context, const prep_progress *now)
 static void on_build_announce(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
 {
     const cli_progress *progress = context;
-    if (progress->quiet) return;
-    fprintf(stderr, "%.1f M points: the dataset takes %.0f MB", (double)points / 1e6, (double)output_bytes / 1e6);
-    if (scratch_bytes > 0) fprintf(stderr, ", and up to %.0f MB of scratch space", (double)scratch_bytes / 1e6);
-    fprintf(stderr, "\n");
+    if (!progress->quiet) cli_report_announcement(points, scratch_bytes, output_bytes);
 }
 
 static int build_to(const cli_options *o, const char *output, bool words, mospt_err *err)
@@ -104,6 +105,110 @@ static int command_info(const cli_options *o)
     free(points);
     mospt_dataset_close(dataset);
     return code;
+}
+
+/* What `view` and `shot` look at: a dataset that was named, or one that is built of the scans that were. */
+typedef struct {
+    mospt_dataset *dataset;
+    char folder[4096]; /* of a temporary dataset, "" otherwise */
+    int code;          /* exit code so far */
+} place;
+
+static bool is_dataset_name(const char *path)
+{
+    size_t n = strlen(path);
+    while (n > 1 && path[n - 1] == '/') n--;
+    return mospt_dataset_exists(path) || (n > 5 && strncmp(path + n - 5, ".ipts", 5) == 0);
+}
+
+static bool make_temporary_folder(const cli_options *o, char folder[4096], mospt_err *err)
+{
+    const char *below = o->temp_dir != NULL ? o->temp_dir : getenv("TMPDIR");
+    snprintf(folder, 4096, "%s/instantpoints-XXXXXX", below != NULL ? below : "/tmp");
+    if (mkdtemp(folder) != NULL) return true;
+    mospt_err_set(err, MOSPT_EIO, mospt_at_file(folder), "cannot be created");
+    folder[0] = '\0';
+    return false;
+}
+
+static bool place_open(const cli_options *o, const char *output, place *p, mospt_err *err)
+{
+    *p = (place){0};
+    if (o->path_count == 1 && is_dataset_name(o->paths[0])) return mospt_dataset_open(o->paths[0], &p->dataset, err);
+    char path[4200];
+    snprintf(path, sizeof path, "%s", output != NULL ? output : "");
+    if (output == NULL) {
+        if (!make_temporary_folder(o, p->folder, err)) return false;
+        snprintf(path, sizeof path, "%s/scans.ipts", p->folder);
+    }
+    p->code = build_to(o, path, false, err);
+    return p->code != EXIT_FAILED && mospt_dataset_open(path, &p->dataset, err);
+}
+
+static void place_close(place *p)
+{
+    mospt_dataset_close(p->dataset);
+    if (p->folder[0] != '\0') mospt_file_remove_tree(p->folder, NULL);
+}
+
+static void warn_of_damage(uint32_t nodes, const mospt_err *first)
+{
+    char text[2048];
+    if (nodes == 0) return;
+    mospt_err_text(first, text, sizeof text);
+    fprintf(stderr, "instantpoints: %u damaged node%s not shown: %s\n", nodes, nodes == 1 ? " is" : "s are", text);
+}
+
+static void report_shot(const cli_options *o, const rend_shot_result *r)
+{
+    if (!o->json) {
+        printf("%s: %llu points in %u nodes, %.0f ms on %s\n", o->output, (unsigned long long)r->points_drawn, r->nodes_drawn,
+               r->total_ms, r->renderer);
+        return;
+    }
+    json_t *json = json_pack("{s:s, s:I, s:o, s:I, s:I, s:b, s:I, s:I, s:f, s:s}", "picture", o->output, "points_drawn",
+                             (json_int_t)r->points_drawn, "budget",
+                             r->budget_points == REND_ALL ? json_null() : json_integer((json_int_t)r->budget_points),
+                             "points_in_view", (json_int_t)r->points_in_view, "nodes_drawn", (json_int_t)r->nodes_drawn,
+                             "budget_spent", (int)r->budget_spent, "loaded_bytes", (json_int_t)r->loaded_bytes,
+                             "damaged_nodes", (json_int_t)r->damaged_nodes, "ms", r->total_ms, "renderer", r->renderer);
+    json_dumpf(json, stdout, JSON_INDENT(2));
+    putchar('\n');
+    json_decref(json);
+}
+
+static int command_shot(const cli_options *o)
+{
+    mospt_err err = {0};
+    place p;
+    rend_shot_result result = {0};
+    if (o->path_count == 0) return misuse(o->command, "of what?");
+    if (o->output == NULL) return misuse(o->command, "where to? -o PICTURE.png says it");
+    const rend_shot_options options = {.path = o->output, .width = o->width, .height = o->height, .camera = o->camera,
+                                       .look = o->look, .limits = o->limits};
+    bool ok = place_open(o, NULL, &p, &err) && rend_shot(p.dataset, &options, &result, &err);
+    if (ok) {
+        report_shot(o, &result);
+        warn_of_damage(result.damaged_nodes, &result.damage);
+        if (result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
+    }
+    place_close(&p);
+    return ok ? p.code : fail(&err);
+}
+
+static int command_view(const cli_options *o)
+{
+    mospt_err err = {0};
+    place p;
+    rend_view_result result = {0};
+    if (o->path_count == 0) return misuse(o->command, "of what?");
+    const rend_view_options options = {.width = o->width, .height = o->height, .camera = o->camera, .look = o->look,
+                                       .limits = o->limits, .frames = o->frames, .screenshot = o->screenshot};
+    bool ok = place_open(o, o->output, &p, &err) && rend_view(p.dataset, &options, &result, &err);
+    if (ok) warn_of_damage(result.damaged_nodes, &result.damage);
+    if (ok && result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
+    place_close(&p);
+    return ok ? p.code : fail(&err);
 }
 
 typedef struct {
@@ -183,7 +288,7 @@ static int help(int argc, char **argv)
 int main(int argc, char **argv)
 {
     static int (*const run[CLI_COMMANDS])(const cli_options *) = {
-        [CLI_BUILD] = command_build, [CLI_INFO] = command_info, [CLI_CHECK] = command_check,
+        [CLI_BUILD] = command_build, [CLI_VIEW] = command_view, [CLI_SHOT] = command_shot, [CLI_INFO] = command_info, [CLI_CHECK] = command_check,
     };
     cli_command command;
     cli_options options;

@@ -34,12 +34,11 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
         largest = fmax(largest, fmax(fabs(low[a] - grid.offset[a]), fabs(high[a] - grid.offset[a])));
     }
     if (!(step > 0)) {
-        /* A single point, or identical ones: a step near the resolution of a float at its place. */
-        if (!(extent > 0)) extent = fmax(largest, 1) * 0x1p-6;
-        step = ldexp(1, (int)ceil(log2(extent)) - 30);
-        /* A double holds 53 bits: a finer step than the last of them would only store noise. */
-        step = fmax(step, ldexp(1, (int)ceil(log2(fmax(largest, 0x1p-900))) - 53));
-        if (!(step > 0x1p-1000)) step = 0x1p-1000;
+        step = extent > 0 ? ldexp(1, (int)ceil(log2(extent)) - 30) : 0;
+        /* A double holds 53 bits: a finer step than the last of them would only store noise. Points all at one position
+         * get that step, and points all at the origin any. */
+        step = fmax(step, largest > 0 ? ldexp(1, (int)ceil(log2(largest)) - 53) : 0x1p-20);
+        step = fmax(step, 0x1p-1000);
     }
     while (bits_for(ceil(extent / step) + 1) > MOSPT_GRID_BITS_MAX) step *= 2;
     if (!(largest / step < 0x1p62))
