@@ -64,7 +64,11 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
         .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .columns = o->columns,
         .progress = on_build_progress, .announce = on_build_announce, .context = &progress,
     };
+    /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit is that of the process.
+     * A renderer is better served by the allocator's own ways. */
+    mallopt(M_MMAP_THRESHOLD, 64 << 10);
     bool ok = prep_build(&options, &result, err);
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
     cli_progress_end(&progress);
     if (ok || result.source.left_out_count > 1) cli_report_losses(&result);
     if (ok && o->json && words) cli_report_build_json(stdout, output, &result);
@@ -295,8 +299,6 @@ int main(int argc, char **argv)
     mospt_err err = {0};
     struct sigaction action = {.sa_handler = ask_to_stop, .sa_flags = (int)SA_RESETHAND};
 
-    /* Large buffers go back to the system when they are freed: the memory limit is that of the process. */
-    mallopt(M_MMAP_THRESHOLD, 64 << 10);
     if (argc < 2) return print_help(cli_help(), stderr);
     if (strcmp(argv[1], "help") == 0 || strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) return help(argc, argv);
     if (strcmp(argv[1], "--version") == 0) return printf("instantpoints %s\n", IPTS_VERSION), EXIT_DONE;

@@ -1,4 +1,5 @@
-/* preprocess/bytes.h - numbers from the bytes of a file, whatever the order of the machine's own. */
+/* preprocess/bytes.h - numbers from the bytes of a file, whatever the order of the machine's own.
+ */
 #pragma once
 #include <stdint.h>
 #include <string.h>

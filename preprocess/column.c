@@ -29,13 +29,13 @@ void prep_column_swap(const prep_column *column, uint32_t count)
 }
 
 /* One loop per type: a call per value would cost more than the conversion. */
-#define TO_F64(ENUM, T)                                                                                      \
-    case ENUM:                                                                                               \
-        for (uint32_t i = 0; i < count; i++, p += stride, out += out_step) {                                 \
-            T v;                                                                                             \
-            memcpy(&v, p, sizeof v);                                                                         \
-            *out = (double)v;                                                                                \
-        }                                                                                                    \
+#define TO_F64(ENUM, T)                                                                            \
+    case ENUM:                                                                                     \
+        for (uint32_t i = 0; i < count; i++, p += stride, out += out_step) {                       \
+            T v;                                                                                   \
+            memcpy(&v, p, sizeof v);                                                               \
+            *out = (double)v;                                                                      \
+        }                                                                                          \
         break
 
 void prep_column_to_f64(const prep_column *column, uint32_t count, double *out, size_t out_step)
@@ -59,9 +59,10 @@ void prep_column_to_f64(const prep_column *column, uint32_t count, double *out, 
 }
 #undef TO_F64
 
-#define COPY(SIZE)                                                                                           \
-    case SIZE:                                                                                               \
-        for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) memcpy(out, p, SIZE);           \
+#define COPY(SIZE)                                                                                 \
+    case SIZE:                                                                                     \
+        for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride)                       \
+            memcpy(out, p, SIZE);                                                                  \
         break
 
 void prep_column_copy(const prep_column *column, uint32_t count, uint8_t *out, size_t out_stride)

@@ -15,7 +15,7 @@
 typedef struct {
     prep_folder_file file;
     char *real; /* owned, canonical path: what makes two files the same */
-    bool is_named;
+    bool is_named, is_link;
 } found_file;
 
 typedef struct {
@@ -32,7 +32,8 @@ static void finder_fini(finder *f)
         free(f->at[i].file.name);
         free(f->at[i].real);
     }
-    for (size_t i = 0; i < f->folder_count; i++) free(f->folders[i]);
+    for (size_t i = 0; i < f->folder_count; i++)
+        free(f->folders[i]);
     free(f->folders);
     free(f->at);
 }
@@ -52,7 +53,9 @@ static bool add_file(finder *f, const char *path, const char *name, bool is_name
         f->at = at;
         f->capacity = capacity;
     }
-    found_file file = {{strdup(path), strdup(name)}, realpath(path, NULL), is_named};
+    struct stat st;
+    bool is_link = lstat(path, &st) == 0 && S_ISLNK(st.st_mode);
+    found_file file = {{strdup(path), strdup(name)}, realpath(path, NULL), is_named, is_link};
     if (file.real == NULL) file.real = strdup(path);
     f->at[f->count++] = file;
     return (file.file.path != NULL && file.file.name != NULL && file.real != NULL) ||
@@ -69,7 +72,8 @@ static bool enter(finder *f, const char *path, bool *ok, mospt_err *err)
         free(real);
         return false;
     }
-    char **folders = real != NULL ? realloc(f->folders, (f->folder_count + 1) * sizeof *folders) : NULL;
+    char **folders =
+        real != NULL ? realloc(f->folders, (f->folder_count + 1) * sizeof *folders) : NULL;
     if (folders == NULL) {
         free(real);
         *ok = mospt_err_nomem(err, strlen(path) + 1);
@@ -82,11 +86,13 @@ static bool enter(finder *f, const char *path, bool *ok, mospt_err *err)
 
 static bool walk(finder *f, const char *folder, const char *prefix, mospt_err *err);
 
-static bool take_entry(finder *f, const char *folder, const char *prefix, const char *entry, mospt_err *err)
+static bool take_entry(finder *f, const char *folder, const char *prefix, const char *entry,
+                       mospt_err *err)
 {
     char *path = NULL, *name = NULL;
     bool ok = false;
-    if (asprintf(&path, "%s%s%s", folder, folder[strlen(folder) - 1] == '/' ? "" : "/", entry) < 0) path = NULL;
+    if (asprintf(&path, "%s%s%s", folder, folder[strlen(folder) - 1] == '/' ? "" : "/", entry) < 0)
+        path = NULL;
     if (asprintf(&name, "%s%s%s", prefix, prefix[0] != '\0' ? "/" : "", entry) < 0) name = NULL;
     if (path == NULL || name == NULL) {
         mospt_err_nomem(err, strlen(folder) + strlen(entry) + 2);
@@ -94,11 +100,10 @@ static bool take_entry(finder *f, const char *folder, const char *prefix, const 
     }
     struct stat st;
     ok = true;
-    if (stat(path, &st) != 0) goto done; /* a link that leads nowhere, or a file that has just gone */
-    if (S_ISDIR(st.st_mode) && !has_extension(entry, "ipts"))
-        ok = walk(f, path, name, err);
-    else if (S_ISREG(st.st_mode))
-        ok = add_file(f, path, name, false, err);
+    if (stat(path, &st) != 0)
+        goto done; /* a link that leads nowhere, or a file that has just gone */
+    if (S_ISDIR(st.st_mode) && !has_extension(entry, "ipts")) ok = walk(f, path, name, err);
+    else if (S_ISREG(st.st_mode)) ok = add_file(f, path, name, false, err);
 done:
     free(path);
     free(name);
@@ -110,12 +115,14 @@ static bool walk(finder *f, const char *folder, const char *prefix, mospt_err *e
     bool ok;
     if (!enter(f, folder, &ok, err)) return ok;
     DIR *dir = opendir(folder);
-    if (dir == NULL) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(folder), "cannot read the folder");
+    if (dir == NULL)
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(folder), "cannot read the folder");
     while (ok) {
         errno = 0;
         struct dirent *entry = readdir(dir);
         if (entry == NULL) {
-            if (errno != 0) ok = mospt_err_set(err, MOSPT_EIO, mospt_at_file(folder), "cannot read the folder");
+            if (errno != 0)
+                ok = mospt_err_set(err, MOSPT_EIO, mospt_at_file(folder), "cannot read the folder");
             break;
         }
         if (entry->d_name[0] != '.') ok = take_entry(f, folder, prefix, entry->d_name, err);
@@ -143,12 +150,15 @@ static int compare_names(const void *a, const void *b)
     return order != 0 ? order : strcmp(x->file.path, y->file.path);
 }
 
+/* Of several names of one file, what was asked for comes first, and the file itself before a link
+ * to it. */
 static int compare_real(const void *a, const void *b)
 {
     const found_file *x = a, *y = b;
     int order = strcmp(x->real, y->real);
     if (order != 0) return order;
     if (x->is_named != y->is_named) return x->is_named ? -1 : 1;
+    if (x->is_link != y->is_link) return x->is_link ? 1 : -1;
     return compare_names(a, b);
 }
 
@@ -172,13 +182,15 @@ static void drop_duplicates(finder *f)
 /* Extensions that promise a scan, so that a damaged file is named rather than passed over. */
 static bool promises_scan(const char *path)
 {
-    static const char *const sure[] = {"las", "laz", "ply", "e57", "pcd", "ptx", "pts", "xyz", "3d", "asc", "ply.gz"};
+    static const char *const sure[] = {"las", "laz", "ply", "e57", "pcd",   "ptx",
+                                       "pts", "xyz", "3d",  "asc", "ply.gz"};
     for (size_t i = 0; i < sizeof sure / sizeof sure[0]; i++) {
         if (has_extension(path, sure[i])) return true;
     }
     const char *dot = strrchr(path, '.');
     if (dot != NULL && strcasecmp(dot, ".gz") == 0) {
-        while (dot > path && dot[-1] != '.' && dot[-1] != '/') dot--;
+        while (dot > path && dot[-1] != '.' && dot[-1] != '/')
+            dot--;
         return strncasecmp(dot, "xyz", 3) == 0;
     }
     return dot != NULL && strncasecmp(dot, ".xyz", 4) == 0;
@@ -187,7 +199,8 @@ static bool promises_scan(const char *path)
 /* Extensions under which numbers may be points, or anything else: only a look inside tells. */
 static bool may_be_text_scan(const char *path)
 {
-    static const char *const maybe[] = {"txt", "csv", "txt.gz", "csv.gz", "pts.gz", "asc.gz", "dat", "tsv"};
+    static const char *const maybe[] = {"txt",    "csv",    "txt.gz", "csv.gz",
+                                        "pts.gz", "asc.gz", "dat",    "tsv"};
     for (size_t i = 0; i < sizeof maybe / sizeof maybe[0]; i++) {
         if (has_extension(path, maybe[i])) return true;
     }
@@ -225,20 +238,20 @@ static bool is_scan(const found_file *file)
 static void share_out(finder *f, prep_folder_list *list)
 {
     for (size_t i = 0; i < f->count; i++) {
-        if (is_scan(&f->at[i]))
-            list->files[list->count++] = f->at[i].file;
-        else
-            list->unknown[list->unknown_count++] = f->at[i].file;
+        if (is_scan(&f->at[i])) list->files[list->count++] = f->at[i].file;
+        else list->unknown[list->unknown_count++] = f->at[i].file;
         f->at[i].file = (prep_folder_file){0};
     }
 }
 
-bool prep_folder_list_make(const char *const *paths, size_t path_count, prep_folder_list *out, mospt_err *err)
+bool prep_folder_list_make(const char *const *paths, size_t path_count, prep_folder_list *out,
+                           mospt_err *err)
 {
     finder f = {0};
     prep_folder_list list = {0};
     bool ok = true;
-    for (size_t i = 0; i < path_count && ok; i++) ok = find_path(&f, paths[i], err);
+    for (size_t i = 0; i < path_count && ok; i++)
+        ok = find_path(&f, paths[i], err);
     if (!ok) goto done;
     drop_duplicates(&f);
     list.files = calloc(f.count + 1, sizeof *list.files);

@@ -22,7 +22,8 @@ struct prep_input {
     const char *fault;
 };
 
-static bool read_file(prep_input *in, uint64_t offset, void *out, size_t size, size_t *got, mospt_err *err)
+static bool read_file(prep_input *in, uint64_t offset, void *out, size_t size, size_t *got,
+                      mospt_err *err)
 {
     size_t done = 0;
     *got = 0;
@@ -30,7 +31,8 @@ static bool read_file(prep_input *in, uint64_t offset, void *out, size_t size, s
         ssize_t n = pread(in->fd, (uint8_t *)out + done, size - done, (off_t)(offset + done));
         if (n < 0 && errno == EINTR) continue;
         if (n < 0)
-            return mospt_err_set(err, MOSPT_EIO, mospt_at_byte(in->path, offset + done), "cannot read");
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_byte(in->path, offset + done),
+                                 "cannot read");
         if (n == 0) break;
         done += (size_t)n;
     }
@@ -48,7 +50,8 @@ static bool open_file(prep_input *in, mospt_err *err)
         return mospt_err_set(err, MOSPT_EIO, mospt_at_file(in->path), "cannot examine");
     if (!S_ISREG(st.st_mode))
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(in->path),
-                             S_ISDIR(st.st_mode) ? "a folder, not a scan file" : "not a regular file");
+                             S_ISDIR(st.st_mode) ? "a folder, not a scan file"
+                                                 : "not a regular file");
     in->size = (uint64_t)st.st_size;
     return true;
 }
@@ -131,14 +134,13 @@ static bool refill_packed(prep_input *in, mospt_err *err)
     return true;
 }
 
-/* A gzip file may hold several members one after the other; what follows the last one and is none is padding. */
+/* A gzip file may hold several members one after the other; what follows the last one and is none
+ * is padding. */
 static bool start_next_member(prep_input *in, mospt_err *err)
 {
     if (in->stream.avail_in == 0 && !refill_packed(in, err)) return false;
-    if (in->stream.avail_in == 0 || in->stream.next_in[0] != 0x1f)
-        in->is_finished = true;
-    else
-        inflateReset(&in->stream);
+    if (in->stream.avail_in == 0 || in->stream.next_in[0] != 0x1f) in->is_finished = true;
+    else inflateReset(&in->stream);
     return true;
 }
 
@@ -203,7 +205,8 @@ bool prep_input_seek(prep_input *input, uint64_t offset, mospt_err *err)
     return true;
 }
 
-bool prep_input_read_at(prep_input *input, uint64_t offset, void *out, size_t size, size_t *got, mospt_err *err)
+bool prep_input_read_at(prep_input *input, uint64_t offset, void *out, size_t size, size_t *got,
+                        mospt_err *err)
 {
     return read_file(input, offset, out, size, got, err);
 }

@@ -27,7 +27,8 @@ static uint64_t record_offset(const las_state *las, uint64_t point)
     return las->header.data_offset + point * las->header.record_length;
 }
 
-/* Looks at blocks of records spread evenly over the file: the first points of a scan are often all alike. */
+/* Looks at blocks of records spread evenly over the file: the first points of a scan are often all
+ * alike. */
 static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample, mospt_err *err)
 {
     if (!alloc_block(las, err)) return false;
@@ -38,7 +39,8 @@ static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample
         uint64_t first = blocks == SAMPLE_BLOCKS ? count / blocks * b : want * b;
         uint64_t n = count - first < want ? count - first : want;
         size_t got;
-        if (!prep_input_read_at(scan->input, record_offset(las, first), las->block, n * length, &got, err))
+        if (!prep_input_read_at(scan->input, record_offset(las, first), las->block, n * length,
+                                &got, err))
             return false;
         prep_las_sample_add(sample, &las->header, las->block, got / length);
     }
@@ -53,14 +55,16 @@ static bool check_openable(prep_scan *scan, const prep_las_header *h, mospt_err 
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, 104),
                              "LAZ compression is not read yet; unpack the file to LAS");
     if (h->declared == 0)
-        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path), "the LAS file holds no points");
+        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
+                             "the LAS file holds no points");
     if (h->present == 0)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, h->data_offset),
                              "the file ends before the first of %" PRIu64 " points", h->declared);
     return true;
 }
 
-static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *options, mospt_err *err)
+static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,
+                     mospt_err *err)
 {
     (void)index, (void)options;
     las_state *las = calloc(1, sizeof *las);
@@ -70,9 +74,10 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     if (!check_openable(scan, &las->header, err)) return false;
     prep_las_describe(scan, &las->header);
     if (las->header.present < las->header.declared)
-        prep_scan_set_damage(scan, mospt_at_byte(scan->path, record_offset(las, las->header.present)),
-                             "the file ends here: the header claims %" PRIu64 " points, %" PRIu64 " are there",
-                             las->header.declared, las->header.present);
+        prep_scan_set_damage(
+            scan, mospt_at_byte(scan->path, record_offset(las, las->header.present)),
+            "the file ends here: the header claims %" PRIu64 " points, %" PRIu64 " are there",
+            las->header.declared, las->header.present);
 
     prep_las_sample sample;
     uint64_t sampled = SAMPLE_BLOCKS * SAMPLE_RECORDS;
@@ -95,7 +100,8 @@ static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
         if (n > batch->capacity - batch->count) n = batch->capacity - batch->count;
         size_t got;
         uint64_t offset = record_offset(las, las->next);
-        if (!prep_input_read_at(scan->input, offset, las->block, n * length, &got, err)) return false;
+        if (!prep_input_read_at(scan->input, offset, las->block, n * length, &got, err))
+            return false;
         prep_las_decode(&las->layout, las->block, (uint32_t)(got / length), batch);
         las->next += got / length;
         if (got == n * length) continue;

@@ -26,16 +26,19 @@ uint32_t prep_las_record_size(uint8_t point_format)
 
 static bool fail(const prep_input *in, uint64_t byte, mospt_err *err, const char *sentence)
 {
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(in), byte), "%s", sentence);
+    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(in), byte), "%s",
+                         sentence);
 }
 
-static bool parse_fixed_part(const prep_input *in, const uint8_t *p, prep_las_header *h, mospt_err *err)
+static bool parse_fixed_part(const prep_input *in, const uint8_t *p, prep_las_header *h,
+                             mospt_err *err)
 {
     mospt_where at = {.file = prep_input_path(in), .kind = MOSPT_AT_BYTE};
     h->version_minor = p[25];
     at.place = 24;
     if (p[24] != 1 || p[25] > 5)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "LAS version %u.%u is not known", p[24], p[25]);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "LAS version %u.%u is not known", p[24],
+                             p[25]);
 
     h->header_size = prep_le16(p + 94);
     h->data_offset = prep_le32(p + 96);
@@ -45,24 +48,28 @@ static bool parse_fixed_part(const prep_input *in, const uint8_t *p, prep_las_he
     h->record_length = prep_le16(p + 105);
     at.place = 94;
     if (h->header_size < HEADER_SIZE)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "the header claims %u bytes, at least %d are needed",
-                             h->header_size, HEADER_SIZE);
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "the header claims %u bytes, at least %d are needed", h->header_size,
+                             HEADER_SIZE);
     at.place = 96;
     if (h->data_offset < h->header_size || h->data_offset > prep_input_size(in))
         return mospt_err_set(err, MOSPT_EFORMAT, at,
-                             "point data should begin at byte %" PRIu64 ", the header has %u bytes and the file %" PRIu64,
+                             "point data should begin at byte %" PRIu64
+                             ", the header has %u bytes and the file %" PRIu64,
                              h->data_offset, h->header_size, prep_input_size(in));
     at.place = 104;
     if (h->point_format >= PREP_LAS_FORMATS)
         return mospt_err_set(err, MOSPT_EFORMAT, at, "point format %u is not known", p[104]);
     at.place = 105;
     if (h->record_length < record_size[h->point_format])
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "records of %u bytes, point format %u needs %u",
-                             h->record_length, h->point_format, record_size[h->point_format]);
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "records of %u bytes, point format %u needs %u", h->record_length,
+                             h->point_format, record_size[h->point_format]);
     return true;
 }
 
-static bool parse_geometry(const prep_input *in, const uint8_t *p, prep_las_header *h, mospt_err *err)
+static bool parse_geometry(const prep_input *in, const uint8_t *p, prep_las_header *h,
+                           mospt_err *err)
 {
     mospt_where at = {.file = prep_input_path(in), .kind = MOSPT_AT_BYTE};
     h->has_bounds = true;
@@ -73,17 +80,20 @@ static bool parse_geometry(const prep_input *in, const uint8_t *p, prep_las_head
         h->low[a] = prep_le_f64(p + 187 + 16 * a);
         at.place = 131 + 8 * a;
         if (!isfinite(h->scale[a]) || h->scale[a] <= 0)
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "the scale of axis %c is %g", "xyz"[a], h->scale[a]);
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the scale of axis %c is %g", "xyz"[a],
+                                 h -> scale[a]);
         at.place = 155 + 8 * a;
         if (!isfinite(h->offset[a]))
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "the offset of axis %c is %g", "xyz"[a], h->offset[a]);
-        if (!isfinite(h->low[a]) || !isfinite(h->high[a]) || h->low[a] > h->high[a]) h->has_bounds = false;
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the offset of axis %c is %g", "xyz"[a],
+                                 h -> offset[a]);
+        if (!isfinite(h->low[a]) || !isfinite(h->high[a]) || h->low[a] > h->high[a])
+            h->has_bounds = false;
     }
     return true;
 }
 
-/* LAS 1.4 counts twice. The old field is 0 or stale where the new one is meant, but writers exist that fill only the
- * old one, so that the new one is believed only as far as the file agrees. */
+/* LAS 1.4 counts twice. The old field is 0 or stale where the new one is meant, but writers exist
+ * that fill only the old one, so that the new one is believed only as far as the file agrees. */
 static void choose_count(const prep_input *in, const uint8_t *p, bool has_14, prep_las_header *h)
 {
     uint64_t room = (prep_input_size(in) - h->data_offset) / h->record_length;
@@ -108,16 +118,19 @@ static void add_extra(const uint8_t *p, prep_las_header *h)
         extra.type = types[(type - 1) % 10];
         extra.components = 1 + (uint32_t)(type - 1) / 10;
     }
-    memcpy(extra.name, p + 4, 32);
+    for (int i = 0; i < 32 && p[4 + i] != 0; i++)
+        extra.name[i] = p[4 + i] >= ' ' && p[4 + i] < 127 ? (char)p[4 + i] : '_';
     h->extra[h->extra_count++] = extra;
 }
 
-/* The payload of a record with a description of extra bytes. An entry that does not fit ends the list: the bytes after
- * it could not be placed. */
-static bool read_extra(prep_input *in, uint64_t offset, uint64_t size, prep_las_header *h, mospt_err *err)
+/* The payload of a record with a description of extra bytes. An entry that does not fit ends the
+ * list: the bytes after it could not be placed. */
+static bool read_extra(prep_input *in, uint64_t offset, uint64_t size, prep_las_header *h,
+                       mospt_err *err)
 {
     uint32_t room = h->record_length - record_size[h->point_format];
-    for (uint64_t done = 0; done + EXTRA_SIZE <= size && h->extra_count < PREP_LAS_EXTRA_MAX; done += EXTRA_SIZE) {
+    for (uint64_t done = 0; done + EXTRA_SIZE <= size && h->extra_count < PREP_LAS_EXTRA_MAX;
+         done += EXTRA_SIZE) {
         uint8_t entry[EXTRA_SIZE];
         size_t got;
         if (!prep_input_read_at(in, offset + done, entry, sizeof entry, &got, err)) return false;
@@ -136,8 +149,8 @@ static bool read_extra(prep_input *in, uint64_t offset, uint64_t size, prep_las_
     return true;
 }
 
-static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, uint64_t size, prep_las_header *h,
-                        mospt_err *err)
+static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, uint64_t size,
+                        prep_las_header *h, mospt_err *err)
 {
     char user[17] = {0};
     memcpy(user, head + 2, 16);
@@ -148,14 +161,15 @@ static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, u
     return true;
 }
 
-/* Walks the variable length records between header and points. A count that cannot be true is refused; one that is
- * merely wrong ends where the points begin. */
+/* Walks the variable length records between header and points. A count that cannot be true is
+ * refused; one that is merely wrong ends where the points begin. */
 static bool walk_vlrs(prep_input *in, prep_las_header *h, mospt_err *err)
 {
     uint64_t at = h->header_size;
     if (h->vlr_count > (h->data_offset - at) / VLR_SIZE + 1)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(in), 100),
-                             "the header claims %" PRIu32 " variable length records, there is room for %" PRIu64
+                             "the header claims %" PRIu32
+                             " variable length records, there is room for %" PRIu64
                              " bytes of them",
                              h->vlr_count, h->data_offset - at);
     for (uint32_t i = 0; i < h->vlr_count && at + VLR_SIZE <= h->data_offset; i++) {
@@ -170,13 +184,14 @@ static bool walk_vlrs(prep_input *in, prep_las_header *h, mospt_err *err)
     return true;
 }
 
-/* Extended records, behind the points of LAS 1.4, may describe extra bytes too. They are a supplement: if their place or
- * number is wrong, the points can be read all the same. */
+/* Extended records, behind the points of LAS 1.4, may describe extra bytes too. They are a
+ * supplement: if their place or number is wrong, the points can be read all the same. */
 static bool walk_evlrs(prep_input *in, const uint8_t *p, prep_las_header *h, mospt_err *err)
 {
     uint64_t at = prep_le64(p + 235), file = prep_input_size(in);
     uint32_t count = prep_le32(p + 243);
-    for (uint32_t i = 0; i < count && at >= h->data_offset && at < file && file - at >= EVLR_SIZE; i++) {
+    for (uint32_t i = 0; i < count && at >= h->data_offset && at < file && file - at >= EVLR_SIZE;
+         i++) {
         uint8_t head[EVLR_SIZE];
         size_t got;
         if (!prep_input_read_at(in, at, head, sizeof head, &got, err)) return false;
@@ -197,7 +212,8 @@ bool prep_las_header_read(prep_input *input, prep_las_header *out, mospt_err *er
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(prep_input_path(input)),
                              "LAS inside gzip is not read; unpack it first");
     if (!prep_input_read_at(input, 0, p, sizeof p, &got, err)) return false;
-    if (got < 4 || memcmp(p, "LASF", 4) != 0) return fail(input, 0, err, "no LAS file: the signature is missing");
+    if (got < 4 || memcmp(p, "LASF", 4) != 0)
+        return fail(input, 0, err, "no LAS file: the signature is missing");
     if (got < HEADER_SIZE) return fail(input, got, err, "the file ends inside the LAS header");
     if (!parse_fixed_part(input, p, &h, err)) return false;
     if (!parse_geometry(input, p, &h, err)) return false;

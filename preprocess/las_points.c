@@ -12,21 +12,23 @@
 
 enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 
-/* Described extra bytes beyond this are left out: no scanner writes them, and they multiply the memory of every batch. */
+/* Described extra bytes beyond this are left out: no scanner writes them, and they multiply the
+ * memory of every batch. */
 enum { EXTRA_ROW_MAX = 1024 };
 
 /* Bytes in a record where the optional parts begin; 0: the format does not have them. */
 static const struct {
     uint8_t gps, rgb, nir;
 } part[PREP_LAS_FORMATS] = {
-    {0, 0, 0},   {20, 0, 0},  {0, 20, 0},   {20, 28, 0}, {20, 0, 0},   {20, 28, 0},
-    {22, 0, 0},  {22, 30, 0}, {22, 30, 36}, {22, 0, 0},  {22, 30, 36},
+    {0, 0, 0},  {20, 0, 0},  {0, 20, 0},   {20, 28, 0}, {20, 0, 0},   {20, 28, 0},
+    {22, 0, 0}, {22, 30, 0}, {22, 30, 36}, {22, 0, 0},  {22, 30, 36},
 };
 
 bool prep_las_sample_init(prep_las_sample *sample, uint64_t record_count, mospt_err *err)
 {
     size_t size = PREP_TONE_SAMPLES * sizeof *sample->intensity;
-    *sample = (prep_las_sample){.step = record_count / PREP_TONE_SAMPLES + 1, .intensity = malloc(size)};
+    *sample =
+        (prep_las_sample){.step = record_count / PREP_TONE_SAMPLES + 1, .intensity = malloc(size)};
     return sample->intensity != NULL || mospt_err_nomem(err, size);
 }
 
@@ -36,8 +38,8 @@ void prep_las_sample_fini(prep_las_sample *sample)
     *sample = (prep_las_sample){0};
 }
 
-void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header, const uint8_t *records,
-                         size_t count)
+void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header,
+                         const uint8_t *records, size_t count)
 {
     uint32_t rgb_at = part[header->point_format].rgb;
     for (size_t i = 0; i < count; i++) {
@@ -65,11 +67,12 @@ static void add_field(prep_scan *scan, prep_las_layout *layout, const char *name
 static void add_copy(prep_scan *scan, prep_las_layout *layout, const char *name, mospt_type type,
                      uint32_t components, uint32_t at)
 {
-    add_field(scan, layout, name, type, components, (prep_las_field){.kind = FIELD_COPY, .at = (uint16_t)at});
+    add_field(scan, layout, name, type, components,
+              (prep_las_field){.kind = FIELD_COPY, .at = (uint16_t)at});
 }
 
-static void add_bits(prep_scan *scan, prep_las_layout *layout, const char *name, uint16_t at, uint8_t shift,
-                     uint8_t mask)
+static void add_bits(prep_scan *scan, prep_las_layout *layout, const char *name, uint16_t at,
+                     uint8_t shift, uint8_t mask)
 {
     prep_las_field field = {.kind = FIELD_BITS, .at = at, .shift = shift, .mask = mask};
     add_field(scan, layout, name, MOSPT_U8, 1, field);
@@ -80,7 +83,8 @@ static void add_standard_old(prep_scan *scan, prep_las_layout *layout)
     add_bits(scan, layout, "return_number", 14, 0, 7);
     add_bits(scan, layout, "number_of_returns", 14, 3, 7);
     add_bits(scan, layout, "classification", 15, 0, 31);
-    add_field(scan, layout, "flags", MOSPT_U8, 1, (prep_las_field){.kind = FIELD_FLAGS_OLD, .at = 14});
+    add_field(scan, layout, "flags", MOSPT_U8, 1,
+              (prep_las_field){.kind = FIELD_FLAGS_OLD, .at = 14});
     add_copy(scan, layout, "scan_angle", MOSPT_I8, 1, 16);
     add_copy(scan, layout, "user_data", MOSPT_U8, 1, 17);
     add_copy(scan, layout, "point_source", MOSPT_U16, 1, 18);
@@ -91,7 +95,8 @@ static void add_standard_new(prep_scan *scan, prep_las_layout *layout)
     add_bits(scan, layout, "return_number", 14, 0, 15);
     add_bits(scan, layout, "number_of_returns", 14, 4, 15);
     add_copy(scan, layout, "classification", MOSPT_U8, 1, 16);
-    add_field(scan, layout, "flags", MOSPT_U8, 1, (prep_las_field){.kind = FIELD_FLAGS_NEW, .at = 15});
+    add_field(scan, layout, "flags", MOSPT_U8, 1,
+              (prep_las_field){.kind = FIELD_FLAGS_NEW, .at = 15});
     add_bits(scan, layout, "scanner_channel", 15, 4, 3);
     add_copy(scan, layout, "scan_angle", MOSPT_I16, 1, 18);
     add_copy(scan, layout, "user_data", MOSPT_U8, 1, 17);
@@ -104,8 +109,9 @@ static void add_undescribed(prep_scan *scan, prep_las_layout *layout, uint32_t a
     if (size == 0) return;
     add_copy(scan, layout, "extra_bytes", MOSPT_U8, size < 255 ? size : 255, at);
     if (size > 255)
-        prep_scan_set_damage(scan, mospt_at_byte(scan->path, 105),
-                             "%u bytes of every record are not described; the first 255 of them are kept", size);
+        prep_scan_set_damage(
+            scan, mospt_at_byte(scan->path, 105),
+            "%u bytes of every record are not described; the first 255 of them are kept", size);
 }
 
 static void add_extra(prep_scan *scan, prep_las_layout *layout, const prep_las_header *h)
@@ -116,7 +122,8 @@ static void add_extra(prep_scan *scan, prep_las_layout *layout, const prep_las_h
         uint32_t size = e->components * (uint32_t)mospt_type_size(e->type);
         if (row + size > EXTRA_ROW_MAX || scan->info.attributes.count == MOSPT_ATTRIBUTES_MAX) {
             prep_scan_set_damage(scan, mospt_at_byte(scan->path, 105),
-                                 "%u bytes of extra attributes in every record are too many; `%.32s` and those after "
+                                 "%u bytes of extra attributes in every record are too many; "
+                                 "`%.32s` and those after "
                                  "it are left out",
                                  h->record_length - prep_las_record_size(h->point_format), e->name);
             return;
@@ -141,10 +148,8 @@ void prep_las_layout_make(prep_scan *scan, const prep_las_header *header, prep_l
     layout.rgb_is_16 = sample->rgb_max > 255;
 
     add_copy(scan, &layout, "intensity", MOSPT_U16, 1, 12);
-    if (format < 6)
-        add_standard_old(scan, &layout);
-    else
-        add_standard_new(scan, &layout);
+    if (format < 6) add_standard_old(scan, &layout);
+    else add_standard_new(scan, &layout);
     if (part[format].gps != 0) add_copy(scan, &layout, "gps_time", MOSPT_F64, 1, part[format].gps);
     if (layout.has_rgb) add_copy(scan, &layout, "rgb", MOSPT_U16, 3, part[format].rgb);
     if (part[format].nir != 0) add_copy(scan, &layout, "nir", MOSPT_U16, 1, part[format].nir);
@@ -157,8 +162,8 @@ void prep_las_layout_make(prep_scan *scan, const prep_las_header *header, prep_l
 void prep_las_describe(prep_scan *scan, const prep_las_header *h)
 {
     prep_scan_info *info = &scan->info;
-    snprintf(info->format, sizeof info->format, "%s 1.%u, point format %u", h->is_compressed ? "LAZ" : "LAS",
-             h->version_minor, h->point_format);
+    snprintf(info->format, sizeof info->format, "%s 1.%u, point format %u",
+             h->is_compressed ? "LAZ" : "LAS", h->version_minor, h->point_format);
     info->point_count = h->present;
     info->has_bounds = h->has_bounds;
     info->step = h->scale[0];
@@ -182,7 +187,8 @@ static void decode_xyz(const prep_las_layout *l, const uint8_t *p, uint32_t coun
     }
 }
 
-static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *rgbi)
+static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count,
+                           uint8_t *rgbi)
 {
     prep_tone tone = l->tone;
     size_t stride = l->record_length;
@@ -204,7 +210,8 @@ static void show_rgb(const prep_las_layout *l, const uint8_t *p, uint32_t count,
 
 static void copy_1(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
 {
-    for (uint32_t i = 0; i < count; i++, p += stride) out[i] = *p;
+    for (uint32_t i = 0; i < count; i++, p += stride)
+        out[i] = *p;
 }
 
 static void copy_2(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
@@ -224,28 +231,26 @@ static void copy_8(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out
 }
 
 /* Several components, or sizes that are rare. */
-static void copy_any(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+static void copy_any(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
+                     uint8_t *out)
 {
     size_t size = f->size, row = size * f->components;
     for (uint32_t i = 0; i < count; i++, p += stride, out += row) {
         memcpy(out, p, row);
         if (!prep_host_is_big_endian()) continue;
-        for (size_t k = 0; k < row; k++) out[k] = p[k - k % size + size - 1 - k % size];
+        for (size_t k = 0; k < row; k++)
+            out[k] = p[k - k % size + size - 1 - k % size];
     }
 }
 
-static void copy_field(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+static void copy_field(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
+                       uint8_t *out)
 {
-    if (f->components != 1)
-        copy_any(f, p, stride, count, out);
-    else if (f->size == 1)
-        copy_1(p, stride, count, out);
-    else if (f->size == 2)
-        copy_2(p, stride, count, out);
-    else if (f->size == 8)
-        copy_8(p, stride, count, out);
-    else
-        copy_any(f, p, stride, count, out);
+    if (f->components != 1) copy_any(f, p, stride, count, out);
+    else if (f->size == 1) copy_1(p, stride, count, out);
+    else if (f->size == 2) copy_2(p, stride, count, out);
+    else if (f->size == 8) copy_8(p, stride, count, out);
+    else copy_any(f, p, stride, count, out);
 }
 
 static uint8_t flags_old(const uint8_t *p)
@@ -258,8 +263,8 @@ static uint8_t flags_new(const uint8_t *p)
     return (uint8_t)((p[0] & 15) | (p[0] >> 6 & 1) << 4 | (p[0] >> 7) << 5);
 }
 
-static void decode_field(const prep_las_field *f, const uint8_t *records, size_t stride, uint32_t count,
-                         uint8_t *out)
+static void decode_field(const prep_las_field *f, const uint8_t *records, size_t stride,
+                         uint32_t count, uint8_t *out)
 {
     const uint8_t *p = records + f->at;
     uint8_t shift = f->shift, mask = f->mask;
@@ -268,18 +273,22 @@ static void decode_field(const prep_las_field *f, const uint8_t *records, size_t
         copy_field(f, p, stride, count, out);
         break;
     case FIELD_BITS:
-        for (uint32_t i = 0; i < count; i++, p += stride) out[i] = (uint8_t)(*p >> shift & mask);
+        for (uint32_t i = 0; i < count; i++, p += stride)
+            out[i] = (uint8_t)(*p >> shift & mask);
         break;
     case FIELD_FLAGS_OLD:
-        for (uint32_t i = 0; i < count; i++, p += stride) out[i] = flags_old(p);
+        for (uint32_t i = 0; i < count; i++, p += stride)
+            out[i] = flags_old(p);
         break;
     default:
-        for (uint32_t i = 0; i < count; i++, p += stride) out[i] = flags_new(p);
+        for (uint32_t i = 0; i < count; i++, p += stride)
+            out[i] = flags_new(p);
         break;
     }
 }
 
-void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count, prep_batch *batch)
+void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
+                     prep_batch *batch)
 {
     uint32_t first = batch->count;
     uint8_t *rgbi = batch->rgbi + 4 * (size_t)first;

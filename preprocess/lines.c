@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool prep_lines_init(prep_lines *lines, prep_input *input, size_t capacity, uint64_t number, mospt_err *err)
+bool prep_lines_init(prep_lines *lines, prep_input *input, size_t capacity, uint64_t number,
+                     mospt_err *err)
 {
     *lines = (prep_lines){.input = input, .capacity = capacity, .number = number};
     lines->buffer = malloc(capacity);
@@ -22,7 +23,8 @@ static bool refill(prep_lines *lines, mospt_err *err)
     memmove(lines->buffer, lines->buffer + lines->begin, kept);
     lines->begin = 0;
     lines->end = kept;
-    if (!prep_input_read(lines->input, lines->buffer + kept, lines->capacity - kept, &got, err)) return false;
+    if (!prep_input_read(lines->input, lines->buffer + kept, lines->capacity - kept, &got, err))
+        return false;
     lines->end += got;
     lines->is_last = got < lines->capacity - kept;
     return true;

@@ -12,10 +12,11 @@ typedef struct {
 } prep_lines;
 
 /* Starts at the input's present place, which `number` lines precede. */
-bool prep_lines_init(prep_lines *lines, prep_input *input, size_t capacity, uint64_t number, mospt_err *err);
+bool prep_lines_init(prep_lines *lines, prep_input *input, size_t capacity, uint64_t number,
+                     mospt_err *err);
 void prep_lines_fini(prep_lines *lines);
 
-/* The next line, without its end (LF, CR LF). A line longer than the buffer comes in pieces under one number.
- * text     out, [*length], valid until the next call; NULL at the end of the input
+/* The next line, without its end (LF, CR LF). A line longer than the buffer comes in pieces under
+ * one number. text     out, [*length], valid until the next call; NULL at the end of the input
  * errors   MOSPT_EIO, MOSPT_ENOMEM */
 bool prep_lines_next(prep_lines *lines, const char **text, size_t *length, mospt_err *err);

@@ -10,8 +10,9 @@
 /* Longer numbers are no measurement. */
 enum { NUMBER_MAX = 511 };
 
-static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
-                                        1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+static const double power_of_ten[23] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                        1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                        1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
 static inline bool is_digit(const char *p, const char *end)
 {
@@ -30,8 +31,8 @@ static const char *parse_special(const char *p, const char *end, bool is_negativ
     static const struct {
         const char *word;
         bool is_nan;
-    } words[] = {{"nan", true},       {"infinity", false}, {"inf", false},     {"1.#qnan", true},
-                 {"1.#snan", true},   {"1.#ind", true},    {"1.#inf", false}};
+    } words[] = {{"nan", true},     {"infinity", false}, {"inf", false},   {"1.#qnan", true},
+                 {"1.#snan", true}, {"1.#ind", true},    {"1.#inf", false}};
     for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
         const char *q = match(p, end, words[i].word);
         if (q == NULL) continue;
@@ -39,7 +40,8 @@ static const char *parse_special(const char *p, const char *end, bool is_negativ
             const char *close = memchr(q, ')', (size_t)(end - q));
             if (close != NULL) q = close + 1;
         }
-        while (words[i].word[0] == '1' && is_digit(q, end)) q++; /* 1.#INF00 */
+        while (words[i].word[0] == '1' && is_digit(q, end))
+            q++; /* 1.#INF00 */
         *out = words[i].is_nan ? (double)NAN : (double)INFINITY;
         if (is_negative) *out = -*out;
         return q;
@@ -52,7 +54,8 @@ static double parse_slowly(const char *text, const char *end)
     char copy[NUMBER_MAX + 1];
     memcpy(copy, text, (size_t)(end - text));
     copy[end - text] = '\0';
-    /* the program's locale may have decimal commas; the C locale needs no memory and costs nothing to ask for */
+    /* the program's locale may have decimal commas; the C locale needs no memory and costs nothing
+     * to ask for */
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     double value = strtod_l(copy, NULL, c);
     freelocale(c);
@@ -83,11 +86,13 @@ const char *prep_number_parse(const char *text, const char *end, double *out)
 
     uint64_t mantissa = 0;
     const char *start = p;
-    for (; is_digit(p, end); p++) mantissa = mantissa * 10 + (uint64_t)(*p - '0');
+    for (; is_digit(p, end); p++)
+        mantissa = mantissa * 10 + (uint64_t)(*p - '0');
     long digits = p - start, fraction = 0;
     if (p < end && *p == '.') {
         const char *dot = p++;
-        for (; is_digit(p, end); p++) mantissa = mantissa * 10 + (uint64_t)(*p - '0');
+        for (; is_digit(p, end); p++)
+            mantissa = mantissa * 10 + (uint64_t)(*p - '0');
         fraction = p - dot - 1;
         digits += fraction;
         if (p < end && *p == '#') return parse_special(start, end, is_negative, out);

@@ -22,7 +22,7 @@ typedef struct {
 typedef struct {
     prep_ply_header header;
     prep_ply_rows rows;
-    uint32_t at[PREP_PLY_PROPERTIES_MAX]; /* byte in the row, per property of the vertex */
+    uint32_t at[PREP_PLY_PROPERTIES_MAX];     /* byte in the row, per property of the vertex */
     int xyz[3], rgb[3], normal[3], intensity; /* property index; -1: there is none */
     double rgb_scale;                         /* raw to 0..255 */
     prep_tone tone;
@@ -30,9 +30,11 @@ typedef struct {
     double *scratch; /* [rows.capacity], owned */
 } ply_state;
 
-static bool find_three(const ply_state *ply, const prep_ply_element *e, const char *const names[3], int out[3])
+static bool find_three(const ply_state *ply, const prep_ply_element *e, const char *const names[3],
+                       int out[3])
 {
-    for (int c = 0; c < 3; c++) out[c] = prep_ply_find(&ply->header, e, names[c]);
+    for (int c = 0; c < 3; c++)
+        out[c] = prep_ply_find(&ply->header, e, names[c]);
     if (out[0] >= 0 && out[1] >= 0 && out[2] >= 0) return true;
     out[0] = out[1] = out[2] = -1;
     return false;
@@ -46,7 +48,8 @@ static bool find_vertex(prep_scan *scan, ply_state *ply, mospt_err *err)
         for (uint32_t i = 0; i < h->element_count; i++) {
             const prep_ply_element *e = &h->element[i];
             bool fits = round == 0 ? strcasecmp(e->name, "vertex") == 0
-                                   : strcasestr(e->name, "vertex") != NULL || strcasestr(e->name, "point") != NULL;
+                                   : strcasestr(e->name, "vertex") != NULL ||
+                                         strcasestr(e->name, "point") != NULL;
             if (!fits || !find_three(ply, e, xyz, ply->xyz)) continue;
             ply->rows.header = h;
             ply->rows.vertex = e;
@@ -64,8 +67,8 @@ static mospt_type type_of(const ply_state *ply, int property)
 
 static bool all_of_type(const ply_state *ply, const int property[3], mospt_type type)
 {
-    return property[0] >= 0 && type_of(ply, property[0]) == type && type_of(ply, property[1]) == type &&
-           type_of(ply, property[2]) == type;
+    return property[0] >= 0 && type_of(ply, property[0]) == type &&
+           type_of(ply, property[1]) == type && type_of(ply, property[2]) == type;
 }
 
 static void find_meanings(ply_state *ply)
@@ -79,7 +82,8 @@ static void find_meanings(ply_state *ply)
     for (size_t i = 0; i < sizeof rgb / sizeof rgb[0]; i++) {
         if (find_three(ply, e, rgb[i], ply->rgb)) break;
     }
-    if (find_three(ply, e, normal, ply->normal) && !all_of_type(ply, ply->normal, MOSPT_F32)) ply->normal[0] = -1;
+    if (find_three(ply, e, normal, ply->normal) && !all_of_type(ply, ply->normal, MOSPT_F32))
+        ply->normal[0] = -1;
     ply->intensity = -1;
     for (size_t i = 0; i < 2 && ply->intensity < 0; i++)
         ply->intensity = prep_ply_find(&ply->header, e, intensity[i]);
@@ -92,13 +96,14 @@ static prep_column column_of(const ply_state *ply, int property)
                          type_of(ply, property)};
 }
 
-static void add_plane(prep_scan *scan, ply_state *ply, const char *name, const int *property, uint32_t components)
+static void add_plane(prep_scan *scan, ply_state *ply, const char *name, const int *property,
+                      uint32_t components)
 {
     int k = prep_scan_add_attribute(scan, name, type_of(ply, property[0]), components);
     if (k < 0) {
         prep_scan_set_damage(scan, mospt_at_line(scan->path, ply->header.line_count),
-                             "more than %d attributes; `%s` and those after it are left out", MOSPT_ATTRIBUTES_MAX,
-                             name);
+                             "more than %d attributes; `%s` and those after it are left out",
+                             MOSPT_ATTRIBUTES_MAX, name);
         return;
     }
     plane_source source = {.type = type_of(ply, property[0]), .components = components};
@@ -116,12 +121,12 @@ static bool is_one_of(int property, const int set[3])
 static void add_colour(prep_scan *scan, ply_state *ply)
 {
     if (all_of_type(ply, ply->rgb, MOSPT_U8)) return;
-    if (all_of_type(ply, ply->rgb, MOSPT_U16))
-        add_plane(scan, ply, "rgb", ply->rgb, 3);
+    if (all_of_type(ply, ply->rgb, MOSPT_U16)) add_plane(scan, ply, "rgb", ply->rgb, 3);
     else if (all_of_type(ply, ply->rgb, MOSPT_F32) || all_of_type(ply, ply->rgb, MOSPT_F64))
         add_plane(scan, ply, "rgb_float", ply->rgb, 3);
     else
-        for (int c = 0; c < 3; c++) add_plane(scan, ply, ply->header.property[ply->rgb[c]].name, &ply->rgb[c], 1);
+        for (int c = 0; c < 3; c++)
+            add_plane(scan, ply, ply->header.property[ply->rgb[c]].name, &ply->rgb[c], 1);
 }
 
 static void make_planes(prep_scan *scan, ply_state *ply)
@@ -148,7 +153,8 @@ typedef struct {
 
 static void add_to_sample(ply_state *ply, uint32_t count, ply_sample *sample)
 {
-    if (count > PREP_TONE_SAMPLES - sample->count) count = (uint32_t)(PREP_TONE_SAMPLES - sample->count);
+    if (count > PREP_TONE_SAMPLES - sample->count)
+        count = (uint32_t)(PREP_TONE_SAMPLES - sample->count);
     for (int c = 0; c < 3 && ply->rgb[0] >= 0; c++) {
         prep_column column = column_of(ply, ply->rgb[c]);
         double *values = sample->intensity + sample->count;
@@ -170,7 +176,8 @@ static bool read_sample(prep_scan *scan, ply_state *ply, ply_sample *sample, mos
     uint64_t present = ply->rows.present;
     for (uint64_t b = 0; b < SAMPLE_BLOCKS; b++) {
         bool is_spread = can_jump && present > SAMPLE_BLOCKS * SAMPLE_ROWS;
-        if (is_spread && !prep_ply_rows_seek(scan, &ply->rows, present / SAMPLE_BLOCKS * b, err)) return false;
+        if (is_spread && !prep_ply_rows_seek(scan, &ply->rows, present / SAMPLE_BLOCKS * b, err))
+            return false;
         uint32_t count;
         if (!prep_ply_rows_read(scan, &ply->rows, SAMPLE_ROWS, &count, err)) return false;
         if (count == 0) break;
@@ -179,11 +186,13 @@ static bool read_sample(prep_scan *scan, ply_state *ply, ply_sample *sample, mos
     return true;
 }
 
-/* Looks at some vertices to learn how colour and intensity are meant, then goes back to the first. */
+/* Looks at some vertices to learn how colour and intensity are meant, then goes back to the first.
+ */
 static bool take_sample(prep_scan *scan, ply_state *ply, mospt_err *err)
 {
     ply_sample sample = {.intensity = malloc(PREP_TONE_SAMPLES * sizeof *sample.intensity)};
-    if (sample.intensity == NULL) return mospt_err_nomem(err, PREP_TONE_SAMPLES * sizeof *sample.intensity);
+    if (sample.intensity == NULL)
+        return mospt_err_nomem(err, PREP_TONE_SAMPLES * sizeof *sample.intensity);
     bool ok = read_sample(scan, ply, &sample, err);
     bool is_empty = sample.count == 0;
     ply->tone = prep_tone_make(sample.intensity, ply->intensity >= 0 ? sample.count : 0);
@@ -195,11 +204,14 @@ static bool take_sample(prep_scan *scan, ply_state *ply, mospt_err *err)
     if (!ok) return false;
     if (is_empty)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, ply->rows.offset),
-                             "not one of %" PRIu64 " vertices can be read", ply->rows.vertex->count);
+                             "not one of %" PRIu64 " vertices can be read",
+                             ply->rows.vertex->count);
 
-    bool is_float = ply->rgb[0] >= 0 &&
-                    (type_of(ply, ply->rgb[0]) == MOSPT_F32 || type_of(ply, ply->rgb[0]) == MOSPT_F64);
-    ply->rgb_scale = is_float && sample.rgb_max <= 1 ? 255 : sample.rgb_max > 255 ? 255.0 / 65535 : 1;
+    bool is_float = ply->rgb[0] >= 0 && (type_of(ply, ply->rgb[0]) == MOSPT_F32 ||
+                                         type_of(ply, ply->rgb[0]) == MOSPT_F64);
+    ply->rgb_scale = is_float && sample.rgb_max <= 1 ? 255
+                     : sample.rgb_max > 255          ? 255.0 / 65535
+                                                     : 1;
     scan->info.has_rgb = sample.rgb_max > 0;
     scan->info.has_intensity = !ply->tone.is_flat;
     return prep_ply_rows_seek(scan, &ply->rows, 0, err);
@@ -220,17 +232,19 @@ static void release(ply_state *ply)
     ply->scratch = NULL;
 }
 
-/* A file of which less than a thousandth is there was not cut: its count is wrong, and reading on would make points of
- * whatever follows them. */
+/* A file of which less than a thousandth is there was not cut: its count is wrong, and reading on
+ * would make points of whatever follows them. */
 static bool check_count(const prep_scan *scan, const prep_ply_element *e, mospt_err *err)
 {
     uint64_t packing = prep_input_is_gzip(scan->input) ? 1000 : 1; /* deflate packs no better */
     if (e->count / 1000 / packing <= prep_input_size(scan->input)) return true;
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(scan->path),
-                         "the header claims %" PRIu64 " vertices, far more than the file has room for", e->count);
+    return mospt_err_set(
+        err, MOSPT_EFORMAT, mospt_at_file(scan->path),
+        "the header claims %" PRIu64 " vertices, far more than the file has room for", e->count);
 }
 
-static bool ply_open(prep_scan *scan, uint32_t index, const prep_scan_options *options, mospt_err *err)
+static bool ply_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,
+                     mospt_err *err)
 {
     (void)index, (void)options;
     ply_state *ply = calloc(1, sizeof *ply);
@@ -240,7 +254,8 @@ static bool ply_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     if (!find_vertex(scan, ply, err)) return false;
     const prep_ply_element *e = ply->rows.vertex;
     if (e->count == 0)
-        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path), "the PLY file holds no vertices");
+        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
+                             "the PLY file holds no vertices");
     uint32_t at = 0;
     for (uint32_t i = 0; i < e->property_count; i++) {
         const prep_ply_property *p = &ply->header.property[e->first + i];
@@ -264,7 +279,8 @@ static void show(const prep_scan *scan, ply_state *ply, uint32_t count, uint8_t 
     if (scan->info.has_intensity) {
         prep_column column = column_of(ply, ply->intensity);
         prep_column_to_f64(&column, count, values, 1);
-        for (uint32_t i = 0; i < count; i++) memset(rgbi + 4 * (size_t)i, prep_tone_apply(&ply->tone, values[i]), 4);
+        for (uint32_t i = 0; i < count; i++)
+            memset(rgbi + 4 * (size_t)i, prep_tone_apply(&ply->tone, values[i]), 4);
     }
     prep_tone scale = {.scale = ply->rgb_scale};
     for (int c = 0; c < 3 && scan->info.has_rgb; c++) {
@@ -274,7 +290,8 @@ static void show(const prep_scan *scan, ply_state *ply, uint32_t count, uint8_t 
             continue;
         }
         prep_column_to_f64(&column, count, values, 1);
-        for (uint32_t i = 0; i < count; i++) rgbi[4 * (size_t)i + (size_t)c] = prep_tone_apply(&scale, values[i]);
+        for (uint32_t i = 0; i < count; i++)
+            rgbi[4 * (size_t)i + (size_t)c] = prep_tone_apply(&scale, values[i]);
     }
 }
 
@@ -290,8 +307,10 @@ static void decode(const prep_scan *scan, ply_state *ply, uint32_t count, prep_b
         const plane_source *source = &ply->plane[k];
         uint8_t *out = batch->plane[k] + first * batch->plane_size[k];
         for (uint32_t c = 0; c < source->components; c++) {
-            prep_column column = {ply->rows.rows + source->at[c], ply->rows.vertex->row_size, source->type};
-            prep_column_copy(&column, count, out + c * mospt_type_size(source->type), batch->plane_size[k]);
+            prep_column column = {ply->rows.rows + source->at[c], ply->rows.vertex->row_size,
+                                  source->type};
+            prep_column_copy(&column, count, out + c * mospt_type_size(source->type),
+                             batch->plane_size[k]);
         }
     }
     batch->count += count;
@@ -302,10 +321,12 @@ static bool ply_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
     ply_state *ply = scan->state;
     while (batch->count < batch->capacity) {
         uint32_t count;
-        if (!prep_ply_rows_read(scan, &ply->rows, batch->capacity - batch->count, &count, err)) return false;
+        if (!prep_ply_rows_read(scan, &ply->rows, batch->capacity - batch->count, &count, err))
+            return false;
         if (count == 0) break;
         if (ply->scratch == NULL) ply->scratch = malloc(ply->rows.capacity * sizeof *ply->scratch);
-        if (ply->scratch == NULL) return mospt_err_nomem(err, ply->rows.capacity * sizeof *ply->scratch);
+        if (ply->scratch == NULL)
+            return mospt_err_nomem(err, ply->rows.capacity * sizeof *ply->scratch);
         decode(scan, ply, count, batch);
     }
     return true;

@@ -1,9 +1,11 @@
-/* preprocess/ply.h - PLY: ascii, binary little and big endian (Turk, The PLY Polygon File Format, 1994).
+/* preprocess/ply.h - PLY: ascii, binary little and big endian (Turk, The PLY Polygon File Format,
+ * 1994).
  *
- * The points are the element `vertex`, or else the first one with x, y, z whose name speaks of vertices or points. All its
- * scalar properties are kept: colours as display colour (16-bit ones as `rgb` u16 x 3, floating-point ones as `rgb_float`
- * besides), intensity as `intensity`, nx, ny, nz as `normal` f32 x 3, everything else under its own name and type. Lists
- * are passed over, wherever they are. */
+ * The points are the element `vertex`, or else the first one with x, y, z whose name speaks of
+ * vertices or points. All its scalar properties are kept: colours as display colour (16-bit ones as
+ * `rgb` u16 x 3, floating-point ones as `rgb_float` besides), intensity as `intensity`, nx, ny, nz
+ * as `normal` f32 x 3, everything else under its own name and type. Lists are passed over, wherever
+ * they are. */
 #pragma once
 #include "preprocess/lines.h"
 #include "preprocess/scan_format.h"
@@ -43,15 +45,16 @@ typedef struct {
  * errors   MOSPT_EFORMAT with the line that is wrong, MOSPT_EIO, MOSPT_ENOMEM */
 bool prep_ply_header_read(prep_input *input, prep_ply_header *out, mospt_err *err);
 
-/* Index of a property of an element by name, case ignored, -1 if there is none; lists do not count. */
+/* Index of a property of an element by name, case ignored, -1 if there is none; lists do not count.
+ */
 int prep_ply_find(const prep_ply_header *header, const prep_ply_element *element, const char *name);
 
 /* The element's scalar properties, one packed row per vertex, in the byte order of this machine. */
 typedef struct {
-    const prep_ply_header *header; /* borrowed */
+    const prep_ply_header *header;  /* borrowed */
     const prep_ply_element *vertex; /* borrowed */
-    uint64_t offset; /* of the first vertex in the unpacked data */
-    uint64_t line;   /* lines before it, ascii only */
+    uint64_t offset;                /* of the first vertex in the unpacked data */
+    uint64_t line;                  /* lines before it, ascii only */
     uint64_t next, present;
     uint8_t *rows; /* [capacity * row_size], owned */
     uint32_t capacity;
@@ -69,8 +72,10 @@ bool prep_ply_rows_seek(prep_scan *scan, prep_ply_rows *rows, uint64_t vertex, m
 bool prep_ply_rows_is_seekable(const prep_scan *scan, const prep_ply_rows *rows);
 
 /* Reads up to `want` rows, at most `capacity`.
- * count    out; 0 only at the end. Lines that are no vertex are counted as unreadable and left out */
-bool prep_ply_rows_read(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count, mospt_err *err);
+ * count    out; 0 only at the end. Lines that are no vertex are counted as unreadable and left out
+ */
+bool prep_ply_rows_read(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
+                        mospt_err *err);
 
 /* Frees the buffers; the next read allocates them again. */
 void prep_ply_rows_release(prep_ply_rows *rows);

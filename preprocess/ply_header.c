@@ -18,7 +18,9 @@ typedef struct {
 static void split(split_line *line, const char *text, size_t length)
 {
     if (length > LINE_MAX_SIZE) length = LINE_MAX_SIZE;
-    memcpy(line->text, text, length);
+    for (size_t i = 0; i < length; i++) /* names end up in messages and file formats */
+        line->text[i] =
+            (text[i] >= ' ' && text[i] < 127) || text[i] == '\t' || text[i] == '\r' ? text[i] : '_';
     line->text[length] = '\0';
     line->count = 0;
     char *rest = NULL;
@@ -33,10 +35,10 @@ static bool parse_type(const char *word, mospt_type *out)
         const char *name;
         mospt_type type;
     } types[] = {
-        {"char", MOSPT_I8},   {"uchar", MOSPT_U8},   {"short", MOSPT_I16},  {"ushort", MOSPT_U16},
-        {"int", MOSPT_I32},   {"uint", MOSPT_U32},   {"float", MOSPT_F32},  {"double", MOSPT_F64},
-        {"int8", MOSPT_I8},   {"uint8", MOSPT_U8},   {"int16", MOSPT_I16},  {"uint16", MOSPT_U16},
-        {"int32", MOSPT_I32}, {"uint32", MOSPT_U32}, {"int64", MOSPT_I64},  {"uint64", MOSPT_U64},
+        {"char", MOSPT_I8},   {"uchar", MOSPT_U8},   {"short", MOSPT_I16},   {"ushort", MOSPT_U16},
+        {"int", MOSPT_I32},   {"uint", MOSPT_U32},   {"float", MOSPT_F32},   {"double", MOSPT_F64},
+        {"int8", MOSPT_I8},   {"uint8", MOSPT_U8},   {"int16", MOSPT_I16},   {"uint16", MOSPT_U16},
+        {"int32", MOSPT_I32}, {"uint32", MOSPT_U32}, {"int64", MOSPT_I64},   {"uint64", MOSPT_U64},
         {"long", MOSPT_I64},  {"ulong", MOSPT_U64},  {"float32", MOSPT_F32}, {"float64", MOSPT_F64},
     };
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
@@ -76,7 +78,8 @@ static bool parse_element(prep_ply_header *h, const split_line *l, mospt_where a
     if (l->count < 3 || !parse_count(l->word[2], &e.count))
         return mospt_err_set(err, MOSPT_EFORMAT, at, "an element needs a name and a count");
     if (h->element_count == PREP_PLY_ELEMENTS_MAX)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d elements", PREP_PLY_ELEMENTS_MAX);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d elements",
+                             PREP_PLY_ELEMENTS_MAX);
     snprintf(e.name, sizeof e.name, "%.63s", l->word[1]);
     h->element[h->element_count++] = e;
     return true;
@@ -85,17 +88,21 @@ static bool parse_element(prep_ply_header *h, const split_line *l, mospt_where a
 static bool parse_property(prep_ply_header *h, const split_line *l, mospt_where at, mospt_err *err)
 {
     prep_ply_property p = {0};
-    if (h->element_count == 0) return mospt_err_set(err, MOSPT_EFORMAT, at, "a property before any element");
+    if (h->element_count == 0)
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "a property before any element");
     if (h->property_count == PREP_PLY_PROPERTIES_MAX)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d properties", PREP_PLY_PROPERTIES_MAX);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d properties",
+                             PREP_PLY_PROPERTIES_MAX);
     p.is_list = l->count > 1 && strcasecmp(l->word[1], "list") == 0;
     int first = p.is_list ? 2 : 1;
     if (l->count < first + 2 + (p.is_list ? 1 : 0))
         return mospt_err_set(err, MOSPT_EFORMAT, at, "a property needs a type and a name");
     if (p.is_list && !parse_type(l->word[first++], &p.count_type))
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "the type `%.60s` is not known", l->word[first - 1]);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "the type `%.60s` is not known",
+                             l->word[first - 1]);
     if (!parse_type(l->word[first], &p.type))
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "the type `%.60s` is not known", l->word[first]);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "the type `%.60s` is not known",
+                             l->word[first]);
     snprintf(p.name, sizeof p.name, "%.63s", l->word[first + 1]);
 
     prep_ply_element *e = &h->element[h->element_count - 1];
@@ -116,11 +123,14 @@ static bool parse_lines(prep_lines *lines, split_line *l, prep_ply_header *h, mo
         if (!prep_lines_next(lines, &text, &length, err)) return false;
         at.place = lines->number;
         uint64_t read = prep_input_tell(lines->input) - (lines->end - lines->begin);
-        if (text == NULL) return mospt_err_set(err, MOSPT_EFORMAT, at, "the file ends inside the PLY header");
-        if (read > HEADER_MAX) return mospt_err_set(err, MOSPT_EFORMAT, at, "the PLY header does not end");
+        if (text == NULL)
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the file ends inside the PLY header");
+        if (read > HEADER_MAX)
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the PLY header does not end");
         split(l, text, length);
         if (lines->number == 1 && (l->count == 0 || strcmp(l->word[0], "ply") != 0))
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "no PLY file: the first line is not `ply`");
+            return mospt_err_set(err, MOSPT_EFORMAT, at,
+                                 "no PLY file: the first line is not `ply`");
         if (l->count == 0) continue;
         const char *key = l->word[0];
         if (strcmp(key, "format") == 0) {
@@ -145,7 +155,8 @@ bool prep_ply_header_read(prep_input *input, prep_ply_header *out, mospt_err *er
     split_line *line = malloc(sizeof *line);
     if (line == NULL) return mospt_err_nomem(err, sizeof *line);
     memset(out, 0, sizeof *out);
-    bool ok = prep_input_seek(input, 0, err) && prep_lines_init(&lines, input, LINE_MAX_SIZE, 0, err);
+    bool ok =
+        prep_input_seek(input, 0, err) && prep_lines_init(&lines, input, LINE_MAX_SIZE, 0, err);
     if (ok) {
         ok = parse_lines(&lines, line, out, err);
         prep_lines_fini(&lines);

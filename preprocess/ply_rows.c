@@ -31,7 +31,8 @@ static bool alloc_buffers(prep_ply_rows *rows, mospt_err *err)
     rows->capacity = size < ROWS_SIZE ? ROWS_SIZE / size : 1;
     if (rows->rows == NULL) rows->rows = malloc((size_t)rows->capacity * size);
     if (rows->buffer == NULL) rows->buffer = malloc(BUFFER_SIZE);
-    return (rows->rows != NULL && rows->buffer != NULL) || mospt_err_nomem(err, ROWS_SIZE + BUFFER_SIZE);
+    return (rows->rows != NULL && rows->buffer != NULL) ||
+           mospt_err_nomem(err, ROWS_SIZE + BUFFER_SIZE);
 }
 
 void prep_ply_rows_release(prep_ply_rows *rows)
@@ -52,7 +53,8 @@ static step need(prep_scan *scan, prep_ply_rows *rows, size_t size, mospt_err *e
     if (rows->end - rows->begin >= size) return STEP_OK;
     size_t kept = rows->end - rows->begin, got;
     memmove(rows->buffer, rows->buffer + rows->begin, kept);
-    if (!prep_input_read(scan->input, rows->buffer + kept, BUFFER_SIZE - kept, &got, err)) return STEP_ERROR;
+    if (!prep_input_read(scan->input, rows->buffer + kept, BUFFER_SIZE - kept, &got, err))
+        return STEP_ERROR;
     rows->begin = 0;
     rows->end = kept + got;
     return rows->end >= size ? STEP_OK : STEP_END;
@@ -77,7 +79,8 @@ static step skip(prep_scan *scan, prep_ply_rows *rows, uint64_t size, mospt_err 
     return prep_input_tell(scan->input) == at + size ? STEP_OK : STEP_END;
 }
 
-static step skip_list(prep_scan *scan, prep_ply_rows *rows, const prep_ply_property *p, mospt_err *err)
+static step skip_list(prep_scan *scan, prep_ply_rows *rows, const prep_ply_property *p,
+                      mospt_err *err)
 {
     size_t size = mospt_type_size(p->count_type);
     step status = need(scan, rows, size, err);
@@ -93,8 +96,8 @@ static step skip_list(prep_scan *scan, prep_ply_rows *rows, const prep_ply_prope
 }
 
 /* One element of binary data; its scalars go to `row` unless that is NULL. */
-static step read_binary(prep_scan *scan, prep_ply_rows *rows, const prep_ply_element *e, uint8_t *row,
-                        mospt_err *err)
+static step read_binary(prep_scan *scan, prep_ply_rows *rows, const prep_ply_element *e,
+                        uint8_t *row, mospt_err *err)
 {
     for (uint32_t i = 0; i < e->property_count; i++) {
         const prep_ply_property *p = &rows->header->property[e->first + i];
@@ -118,7 +121,8 @@ static bool next_line(prep_ply_rows *rows, const char **text, const char **end, 
     do {
         if (!prep_lines_next(&rows->lines, text, &length, err)) return false;
         *end = *text + length;
-        while (*text < *end && (**text == ' ' || **text == '\t')) (*text)++;
+        while (*text < *end && (**text == ' ' || **text == '\t'))
+            (*text)++;
     } while (*text != NULL && *text == *end);
     return true;
 }
@@ -133,12 +137,14 @@ static step skip_ascii(prep_ply_rows *rows, uint64_t count, mospt_err *err)
     return STEP_OK;
 }
 
-static step skip_element(prep_scan *scan, prep_ply_rows *rows, const prep_ply_element *e, mospt_err *err)
+static step skip_element(prep_scan *scan, prep_ply_rows *rows, const prep_ply_element *e,
+                         mospt_err *err)
 {
     if (e->property_count == 0) return STEP_OK;
     if (is_ascii(rows)) return skip_ascii(rows, e->count, err);
     if (!e->has_lists)
-        return e->count > UINT64_MAX / e->row_size ? STEP_END : skip(scan, rows, e->count * e->row_size, err);
+        return e->count > UINT64_MAX / e->row_size ? STEP_END
+                                                   : skip(scan, rows, e->count * e->row_size, err);
     for (uint64_t i = 0; i < e->count; i++) {
         step status = read_binary(scan, rows, e, NULL, err);
         if (status != STEP_OK) return status;
@@ -146,7 +152,8 @@ static step skip_element(prep_scan *scan, prep_ply_rows *rows, const prep_ply_el
     return STEP_OK;
 }
 
-static bool start_at(prep_scan *scan, prep_ply_rows *rows, uint64_t offset, uint64_t line, mospt_err *err)
+static bool start_at(prep_scan *scan, prep_ply_rows *rows, uint64_t offset, uint64_t line,
+                     mospt_err *err)
 {
     if (!prep_input_seek(scan->input, offset, err)) return false;
     rows->begin = rows->end = 0;
@@ -158,7 +165,8 @@ static bool start_at(prep_scan *scan, prep_ply_rows *rows, uint64_t offset, uint
 /* As many points as the file may hold: a count from the header is not believed beyond that. */
 static uint64_t count_present(prep_scan *scan, const prep_ply_rows *rows)
 {
-    uint64_t size = prep_input_size(scan->input), left = size > rows->offset ? size - rows->offset : 0;
+    uint64_t size = prep_input_size(scan->input),
+             left = size > rows->offset ? size - rows->offset : 0;
     uint64_t least = is_ascii(rows) ? 2 * rows->vertex->property_count : rows->vertex->row_size;
     if (prep_input_is_gzip(scan->input)) return rows->vertex->count;
     /* the last line needs no end */
@@ -176,7 +184,8 @@ bool prep_ply_rows_locate(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
         if (status == STEP_ERROR) return false;
         if (status == STEP_END)
             return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, tell(scan, rows)),
-                                 "the data of element `%s` does not end before the file does", e->name);
+                                 "the data of element `%s` does not end before the file does",
+                                 e->name);
     }
     rows->offset = tell(scan, rows);
     if (is_ascii(rows)) {
@@ -203,12 +212,14 @@ static bool parse_row(const prep_ply_rows *rows, const char *p, const char *end,
         if (property->is_list) {
             p = prep_number_parse(p, end, &count);
             if (p == NULL || !(count >= 0 && count < 1e9)) return false;
-            while (p < end && (*p == ' ' || *p == '\t')) p++;
+            while (p < end && (*p == ' ' || *p == '\t'))
+                p++;
         }
         for (uint32_t k = 0; k < (uint32_t)count; k++) {
             p = prep_number_parse(p, end, &value);
             if (p == NULL || (p < end && *p != ' ' && *p != '\t' && *p != '\r')) return false;
-            while (p < end && (*p == ' ' || *p == '\t' || *p == '\r')) p++;
+            while (p < end && (*p == ' ' || *p == '\t' || *p == '\r'))
+                p++;
         }
         if (property->is_list) continue;
         mospt_type_write(property->type, value, row);
@@ -217,7 +228,8 @@ static bool parse_row(const prep_ply_rows *rows, const char *p, const char *end,
     return true;
 }
 
-static bool read_ascii(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count, mospt_err *err)
+static bool read_ascii(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
+                       mospt_err *err)
 {
     uint32_t done = 0;
     size_t size = rows->vertex->row_size;
@@ -241,7 +253,8 @@ static bool read_ascii(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint
     return true;
 }
 
-static bool read_lists(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count, mospt_err *err)
+static bool read_lists(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
+                       mospt_err *err)
 {
     uint32_t done = 0;
     size_t size = rows->vertex->row_size;
@@ -255,7 +268,8 @@ static bool read_lists(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint
     return true;
 }
 
-static bool read_packed(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count, mospt_err *err)
+static bool read_packed(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
+                        mospt_err *err)
 {
     size_t size = rows->vertex->row_size, got;
     if (!prep_input_read(scan->input, rows->rows, want * size, &got, err)) return false;
@@ -283,15 +297,18 @@ static void tell_early_end(prep_scan *scan, const prep_ply_rows *rows)
     mospt_where at = is_ascii(rows) ? mospt_at_line(scan->path, rows->lines.number)
                                     : mospt_at_byte(scan->path, tell(scan, rows));
     const char *fault = prep_input_fault(scan->input);
-    prep_scan_set_damage(scan, at, "%s: the header claims %" PRIu64 " vertices, %" PRIu64 " are there",
-                         fault != NULL ? fault : "the data ends here", rows->vertex->count, rows->next);
+    prep_scan_set_damage(
+        scan, at, "%s: the header claims %" PRIu64 " vertices, %" PRIu64 " are there",
+        fault != NULL ? fault : "the data ends here", rows->vertex->count, rows->next);
 }
 
-bool prep_ply_rows_read(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count, mospt_err *err)
+bool prep_ply_rows_read(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
+                        mospt_err *err)
 {
     *count = 0;
     if (!alloc_buffers(rows, err)) return false;
-    if (is_ascii(rows) && rows->lines.buffer == NULL && !start_at(scan, rows, rows->offset, rows->line, err))
+    if (is_ascii(rows) && rows->lines.buffer == NULL &&
+        !start_at(scan, rows, rows->offset, rows->line, err))
         return false;
     uint64_t left = rows->vertex->count - rows->next;
     if (rows->is_at_end || left == 0) return true;

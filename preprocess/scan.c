@@ -13,12 +13,14 @@
 #include <string.h>
 #include <strings.h>
 
-/* Doubles this far from zero are no longer coordinates in metres: their own steps are coarser than a decimetre. */
+/* Doubles this far from zero are no longer coordinates in metres: their own steps are coarser than
+ * a decimetre. */
 static const double COORDINATE_MAX = 1e15;
 
 const char *prep_drop_name(prep_drop reason)
 {
-    static const char *const names[PREP_DROP_REASONS] = {"not finite", "out of range", "no return", "unreadable"};
+    static const char *const names[PREP_DROP_REASONS] = {"not finite", "out of range", "no return",
+                                                         "unreadable"};
     return reason < PREP_DROP_REASONS ? names[reason] : "unknown";
 }
 
@@ -39,8 +41,10 @@ static void clean_name(const char *name, char out[MOSPT_ATTRIBUTE_NAME_MAX])
 {
     size_t n = 0;
     for (; name[n] != '\0' && n + 1 < MOSPT_ATTRIBUTE_NAME_MAX; n++)
-        out[n] = (name[n] > ' ' && name[n] < 127 && name[n] != '"' && name[n] != '\\') ? name[n] : '_';
-    while (n > 0 && out[n - 1] == '_') n--;
+        out[n] =
+            (name[n] > ' ' && name[n] < 127 && name[n] != '"' && name[n] != '\\') ? name[n] : '_';
+    while (n > 0 && out[n - 1] == '_')
+        n--;
     out[n] = '\0';
     if (n == 0) memcpy(out, "unnamed", 8);
 }
@@ -89,7 +93,8 @@ static int count_numbers(const char **text)
     return count;
 }
 
-/* PTX has no signature, but it opens with columns, rows, the scanner's position, three axes and a 4 x 4 matrix. */
+/* PTX has no signature, but it opens with columns, rows, the scanner's position, three axes and a 4
+ * x 4 matrix. */
 static bool looks_like_ptx(const uint8_t *head, size_t size)
 {
     static const int shape[10] = {1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
@@ -110,12 +115,14 @@ static bool looks_like_pcd(const uint8_t *head, size_t size)
     return starts_with(head, size, "VERSION ") && memmem(head, size, "\nFIELDS ", 8) != NULL;
 }
 
+/* Text has hardly any control characters; a single one is a fault in it, and no reason to refuse
+ * the rest. */
 static bool is_binary(const uint8_t *head, size_t size)
 {
-    for (size_t i = 0; i < size; i++) {
-        if (head[i] < 32 && !isspace(head[i]) && head[i] != 26) return true;
-    }
-    return false;
+    size_t controls = 0;
+    for (size_t i = 0; i < size; i++)
+        controls += head[i] < 32 && !isspace(head[i]) && head[i] != 26;
+    return controls > 2 + size / 100;
 }
 
 prep_file_kind prep_scan_recognise(const char *path, const uint8_t *head, size_t size)
@@ -123,8 +130,9 @@ prep_file_kind prep_scan_recognise(const char *path, const uint8_t *head, size_t
     static const struct {
         const char *extension;
         prep_file_kind kind;
-    } names[] = {{"las", PREP_FILE_LAS}, {"laz", PREP_FILE_LAS},    {"ply", PREP_FILE_PLY}, {"ply.gz", PREP_FILE_PLY},
-                 {"e57", PREP_FILE_E57}, {"pcd", PREP_FILE_PCD}, {"ptx", PREP_FILE_PTX}};
+    } names[] = {{"las", PREP_FILE_LAS},    {"laz", PREP_FILE_LAS}, {"ply", PREP_FILE_PLY},
+                 {"ply.gz", PREP_FILE_PLY}, {"e57", PREP_FILE_E57}, {"pcd", PREP_FILE_PCD},
+                 {"ptx", PREP_FILE_PTX}};
     if (starts_with(head, size, "LASF")) return PREP_FILE_LAS;
     if (starts_with(head, size, "ASTM-E57")) return PREP_FILE_E57;
     if (starts_with(head, size, "ply") && size > 3 && isspace(head[3])) return PREP_FILE_PLY;
@@ -145,7 +153,8 @@ static bool choose_format(prep_scan *scan, mospt_err *err)
     if (!prep_input_seek(scan->input, 0, err)) return false;
     if (got == 0) {
         const char *fault = prep_input_fault(scan->input);
-        return mospt_err_set(err, MOSPT_EFORMAT, where, "%s", fault != NULL ? fault : "the file is empty (0 bytes)");
+        return mospt_err_set(err, MOSPT_EFORMAT, where, "%s",
+                             fault != NULL ? fault : "the file is empty (0 bytes)");
     }
     switch (prep_scan_recognise(scan->path, head, got)) {
     case PREP_FILE_LAS:
@@ -166,11 +175,12 @@ static bool choose_format(prep_scan *scan, mospt_err *err)
     case PREP_FILE_BINARY:
         break;
     }
-    return mospt_err_set(err, MOSPT_EFORMAT, where, "binary data, but no scan format that this program knows");
+    return mospt_err_set(err, MOSPT_EFORMAT, where,
+                         "binary data, but no scan format that this program knows");
 }
 
-bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *options, prep_scan **out,
-                    mospt_err *err)
+bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *options,
+                    prep_scan **out, mospt_err *err)
 {
     static const prep_scan_options defaults = {0};
     prep_scan *scan = calloc(1, sizeof *scan);
@@ -184,8 +194,8 @@ bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *o
     if (!choose_format(scan, err)) goto fail;
     if (!scan->format->open(scan, index, options != NULL ? options : &defaults, err)) goto fail;
     if (index >= scan->info.scan_count) {
-        mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "scan %u of a file that holds %u", index,
-                      scan->info.scan_count);
+        mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "scan %u of a file that holds %u",
+                      index, scan->info.scan_count);
         goto fail;
     }
     scan->was_damaged_at_open = scan->is_damaged;
@@ -210,16 +220,19 @@ const prep_scan_info *prep_scan_describe(const prep_scan *scan)
     return &scan->info;
 }
 
-/* 0 for a coordinate triple that can be kept; NaN fails every comparison, so that it takes the slow path too. */
+/* 0 for a coordinate triple that can be kept; NaN fails every comparison, so that it takes the slow
+ * path too. */
 static bool is_in_range(const double *xyz)
 {
-    return fabs(xyz[0]) <= COORDINATE_MAX && fabs(xyz[1]) <= COORDINATE_MAX && fabs(xyz[2]) <= COORDINATE_MAX;
+    return fabs(xyz[0]) <= COORDINATE_MAX && fabs(xyz[1]) <= COORDINATE_MAX &&
+           fabs(xyz[2]) <= COORDINATE_MAX;
 }
 
 static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     uint32_t first = 0;
-    while (first < batch->count && is_in_range(batch->xyz + 3 * (size_t)first)) first++;
+    while (first < batch->count && is_in_range(batch->xyz + 3 * (size_t)first))
+        first++;
     if (first == batch->count) return true;
 
     if (scan->keep_capacity < batch->count) {

@@ -1,19 +1,20 @@
-/* preprocess/scan_format.h - what the reader of one file format implements. Internal to the readers; everyone else uses
- * scan.h.
+/* preprocess/scan_format.h - what the reader of one file format implements. Internal to the
+ * readers; everyone else uses scan.h.
  *
- * scan.c opens the input, recognises the format, and calls the reader below; it leaves out coordinates that no grid can
- * hold, keeps the counts, and closes the input. A reader fills `info` and keeps what it needs in `state`. */
+ * scan.c opens the input, recognises the format, and calls the reader below; it leaves out
+ * coordinates that no grid can hold, keeps the counts, and closes the input. A reader fills `info`
+ * and keeps what it needs in `state`. */
 #pragma once
 #include "preprocess/input.h"
 #include "preprocess/scan.h"
 
 typedef struct {
-    /* Fills scan->info (name, format name and scan_count 1 are preset) and scan->state from the header and a sample.
-     * The input stands at its first byte. On failure, close() is called all the same.
-     * index    scan in the file; a reader that knows only one ignores it */
+    /* Fills scan->info (name, format name and scan_count 1 are preset) and scan->state from the
+     * header and a sample. The input stands at its first byte. On failure, close() is called all
+     * the same. index    scan in the file; a reader that knows only one ignores it */
     bool (*open)(prep_scan *scan, uint32_t index, const prep_scan_options *options, mospt_err *err);
-    /* Appends points to the batch (batch->count is where to go on) until it is full or the scan ends. Large buffers are
-     * allocated by the first call. */
+    /* Appends points to the batch (batch->count is where to go on) until it is full or the scan
+     * ends. Large buffers are allocated by the first call. */
     bool (*read)(prep_scan *scan, prep_batch *batch, mospt_err *err);
     bool (*rewind)(prep_scan *scan, mospt_err *err);
     void (*close)(prep_scan *scan); /* frees scan->state, which may be NULL */
@@ -21,7 +22,7 @@ typedef struct {
 
 struct prep_scan {
     const prep_scan_format *format;
-    const char *path; /* borrowed from the input */
+    const char *path;  /* borrowed from the input */
     prep_input *input; /* owned */
     void *state;       /* the reader's own */
     prep_scan_info info;
@@ -33,17 +34,25 @@ struct prep_scan {
     bool was_damaged_at_open; /* damage that the header alone shows outlives a rewind */
 };
 
-/* Notes what is wrong with a file that can be read all the same; the first fault found is the one that is told. */
+/* Notes what is wrong with a file that can be read all the same; the first fault found is the one
+ * that is told. */
 void prep_scan_set_damage(prep_scan *scan, mospt_where where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* Appends an attribute under a name that is printable, not empty, not too long and not taken yet.
  * returns  its index, or -1 if there is no room for more */
-int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type, uint32_t components);
+int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type,
+                            uint32_t components);
 
 /* What the bytes, and failing that the name, say about a file. */
 typedef enum {
-    PREP_FILE_LAS, PREP_FILE_PLY, PREP_FILE_E57, PREP_FILE_PCD, PREP_FILE_PTX, PREP_FILE_TEXT, PREP_FILE_BINARY,
+    PREP_FILE_LAS,
+    PREP_FILE_PLY,
+    PREP_FILE_E57,
+    PREP_FILE_PCD,
+    PREP_FILE_PTX,
+    PREP_FILE_TEXT,
+    PREP_FILE_BINARY,
 } prep_file_kind;
 
 /* head     [size], the first bytes, unpacked */

@@ -15,6 +15,7 @@ enum {
     SAMPLE_HEAD = 1024, /* lines from the start of the file */
     SAMPLE_PLACES = 16, /* and some from places spread evenly over the rest */
     SAMPLE_LINES = 64,
+    QUOTE_SIZE = 60, /* of a line, in a message */
     SAMPLE_MAX = SAMPLE_HEAD + SAMPLE_PLACES * SAMPLE_LINES,
 };
 
@@ -26,16 +27,16 @@ typedef struct {
 
 typedef struct {
     prep_text_columns columns;
-    uint32_t needed;       /* columns that a line must have */
-    uint64_t needed_mask;  /* those of them that must be no word */
-    uint64_t header_line;  /* number of the line with the names; 0: there is none */
-    bool has_counts;       /* lines with a single integer announce how many points follow (PTS) */
+    uint32_t needed;      /* columns that a line must have */
+    uint64_t needed_mask; /* those of them that must be no word */
+    uint64_t header_line; /* number of the line with the names; 0: there is none */
+    bool has_counts;      /* lines with a single integer announce how many points follow (PTS) */
     int xyz[3], rgb[3], intensity; /* columns, -1: there is none */
     double rgb_scale;              /* raw to 0..255; 0: no colour */
     prep_tone tone;
     text_target target[PREP_TEXT_COLUMNS_MAX];
     uint32_t target_count;
-    prep_lines lines;      /* owned */
+    prep_lines lines; /* owned */
     uint64_t declared, taken, count_line;
     bool is_at_end;
 } text_state;
@@ -50,11 +51,12 @@ typedef struct {
     bool is_counted;         /* the first line of numbers is a single integer */
     uint64_t counted;        /* points announced in the lines looked at */
     uint32_t count_lines;
-    char first[80];          /* start of the first line that is no comment */
+    char first[QUOTE_SIZE + 1]; /* start of the first line that is no comment */
     uint64_t first_line, header_line;
     char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
     uint32_t name_count;
-    char comment[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX]; /* names in the last comment before the points */
+    char comment[PREP_TEXT_COLUMNS_MAX]
+                [PREP_TEXT_NAME_MAX]; /* names in the last comment before the points */
     uint32_t comment_count;
     prep_text_range range[PREP_TEXT_COLUMNS_MAX];
     uint32_t mode; /* the usual number of columns */
@@ -62,7 +64,8 @@ typedef struct {
 
 static bool is_comment(const char *p, const char *end)
 {
-    while (p < end && (*p == ' ' || *p == '\t')) p++;
+    while (p < end && (*p == ' ' || *p == '\t'))
+        p++;
     return p < end && (*p == '#' || *p == '%' || (*p == '/' && p + 1 < end && p[1] == '/'));
 }
 
@@ -79,7 +82,8 @@ static bool has_decimal_commas(const char *p, const char *end)
     int fields = 0;
     if (memchr(p, '.', (size_t)(end - p)) != NULL) return false;
     while (p < end) {
-        while (p < end && (*p == ';' || *p == ' ' || *p == '\t')) p++;
+        while (p < end && (*p == ';' || *p == ' ' || *p == '\t'))
+            p++;
         const char *start = p;
         int commas = 0, others = 0;
         for (; p < end && *p != ';' && *p != ' ' && *p != '\t'; p++) {
@@ -87,7 +91,8 @@ static bool has_decimal_commas(const char *p, const char *end)
             others += *p != ',' && !isdigit((unsigned char)*p) && *p != '-' && *p != '+';
         }
         if (p == start) break;
-        bool is_number = others == 0 && commas == 1 && isdigit((unsigned char)p[-1]) && *start != ',';
+        bool is_number =
+            others == 0 && commas == 1 && isdigit((unsigned char)p[-1]) && *start != ',';
         if (!is_number && (commas > 0 || others > 0)) return false;
         fields += is_number;
     }
@@ -110,11 +115,21 @@ static bool take_as_names(text_sample *sample, const char *text, const char *end
     return true;
 }
 
+/* The start of a line as it may be printed. */
+static void quote(const char *text, size_t length, char out[QUOTE_SIZE + 1])
+{
+    size_t n = length < QUOTE_SIZE ? length : QUOTE_SIZE;
+    for (size_t i = 0; i < n; i++)
+        out[i] = text[i] >= ' ' && text[i] < 127 ? text[i] : text[i] == '\t' ? ' ' : '?';
+    out[n] = '\0';
+}
+
 static void take_line(text_sample *sample, const char *text, size_t length, uint64_t number)
 {
     const char *end = text + length;
     if (is_comment(text, end)) {
-        if (sample->count == 0) sample->comment_count = prep_text_split_names(text, end, sample->comment);
+        if (sample->count == 0)
+            sample->comment_count = prep_text_split_names(text, end, sample->comment);
         return;
     }
     uint32_t i = sample->count;
@@ -122,7 +137,7 @@ static void take_line(text_sample *sample, const char *text, size_t length, uint
     if (columns == 0) return;
     if (sample->first_line == 0) {
         sample->first_line = number;
-        snprintf(sample->first, sizeof sample->first, "%.*s", (int)(length < 60 ? length : 60), text);
+        quote(text, length, sample->first);
     }
     if (take_as_names(sample, text, end, number, columns, sample->words[i])) return;
     double count = sample->values[i][0];
@@ -138,7 +153,8 @@ static void take_line(text_sample *sample, const char *text, size_t length, uint
     sample->count++;
 }
 
-static bool take_lines(prep_lines *lines, text_sample *sample, uint32_t limit, bool skip_first, mospt_err *err)
+static bool take_lines(prep_lines *lines, text_sample *sample, uint32_t limit, bool skip_first,
+                       mospt_err *err)
 {
     const char *text;
     size_t length;
@@ -176,7 +192,8 @@ static bool take_sample(prep_scan *scan, text_sample *sample, mospt_err *err)
 static uint32_t usual_columns(const text_sample *sample)
 {
     uint32_t votes[PREP_TEXT_COLUMNS_MAX + 2] = {0}, best = 0;
-    for (uint32_t i = 0; i < sample->count; i++) votes[sample->columns[i]]++;
+    for (uint32_t i = 0; i < sample->count; i++)
+        votes[sample->columns[i]]++;
     for (uint32_t c = 1; c <= PREP_TEXT_COLUMNS_MAX; c++) {
         if (votes[c] > votes[best]) best = c;
     }
@@ -206,18 +223,20 @@ static bool refuse(const prep_scan *scan, const text_sample *sample, mospt_err *
 {
     mospt_where at = mospt_at_line(scan->path, sample->first_line);
     if (sample->mode > 0 && sample->mode < 3)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "%u column%s, a point needs x, y and z", sample->mode,
-                             sample->mode == 1 ? "" : "s");
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "%u column%s, a point needs x, y and z",
+                             sample->mode, sample->mode == 1 ? "" : "s");
     return mospt_err_set(err, MOSPT_EFORMAT, at, "not lines of numbers: `%s`", sample->first);
 }
 
-static bool check_sample(const prep_scan *scan, const text_sample *sample, bool has_names, mospt_err *err)
+static bool check_sample(const prep_scan *scan, const text_sample *sample, bool has_names,
+                         mospt_err *err)
 {
     if (sample->count_lines > 1 && sample->count == 0)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->first_line),
                              "1 column, a point needs x, y and z");
     if (sample->count == 0 && (has_names || sample->is_counted))
-        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path), "the text file holds no points");
+        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
+                             "the text file holds no points");
     if (sample->count == 0) return refuse(scan, sample, err);
     if (sample->decimal_commas * 2 > sample->count)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->first_line),
@@ -225,12 +244,15 @@ static bool check_sample(const prep_scan *scan, const text_sample *sample, bool 
     return true;
 }
 
-/* Most lines must be points; one may always be something else, such as the last one of a file that was cut. */
-static bool check_share(const prep_scan *scan, const text_sample *sample, const text_state *text, mospt_err *err)
+/* Most lines must be points; one may always be something else, such as the last one of a file that
+ * was cut. */
+static bool check_share(const prep_scan *scan, const text_sample *sample, const text_state *text,
+                        mospt_err *err)
 {
     uint32_t good = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
-        bool ok = sample->columns[i] >= text->needed && sample->columns[i] <= PREP_TEXT_COLUMNS_MAX &&
+        bool ok = sample->columns[i] >= text->needed &&
+                  sample->columns[i] <= PREP_TEXT_COLUMNS_MAX &&
                   (sample->words[i] & text->needed_mask) == 0;
         good += ok;
     }
@@ -238,22 +260,22 @@ static bool check_share(const prep_scan *scan, const text_sample *sample, const 
     return (good > 0 && (bad <= 1 || bad * 20 <= sample->count)) || refuse(scan, sample, err);
 }
 
-static bool columns_from_option(const prep_scan *scan, const char *option, const text_sample *sample,
-                                prep_text_columns *out, mospt_err *err)
+static bool columns_from_option(const prep_scan *scan, const char *option,
+                                const text_sample *sample, prep_text_columns *out, mospt_err *err)
 {
     char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
     uint32_t count = prep_text_split_names(option, option + strlen(option), names);
     if (!prep_text_columns_from_names(names, count, out))
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(scan->path), "the columns `%.200s` name no x, y and z",
-                             option);
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(scan->path),
+                             "the columns `%.200s` name no x, y and z", option);
     if (count > sample->mode)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->first_line),
                              "%u columns, `%.200s` names %u", sample->mode, option, count);
     return true;
 }
 
-static bool columns_from_names(const prep_scan *scan, const text_sample *sample, prep_text_columns *out,
-                               bool *is_title, mospt_err *err)
+static bool columns_from_names(const prep_scan *scan, const text_sample *sample,
+                               prep_text_columns *out, bool *is_title, mospt_err *err)
 {
     char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
     memcpy(names, sample->names, sizeof names);
@@ -263,16 +285,18 @@ static bool columns_from_names(const prep_scan *scan, const text_sample *sample,
     *is_title = sample->count > 0 && sample->name_count != sample->mode && sample->mode >= 3;
     return *is_title ||
            mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->header_line),
-                         "neither points nor names of columns with x, y and z: `%s`", sample->first);
+                         "neither points nor names of columns with x, y and z: `%s`",
+                         sample->first);
 }
 
-static bool understand_columns(prep_scan *scan, text_sample *sample, const char *option, text_state *text,
-                               mospt_err *err)
+static bool understand_columns(prep_scan *scan, text_sample *sample, const char *option,
+                               text_state *text, mospt_err *err)
 {
     prep_text_columns *columns = &text->columns;
     bool has_names = sample->name_count > 0, is_title = false;
     sample->mode = usual_columns(sample);
-    for (uint32_t c = 0; c < sample->mode; c++) find_range(sample, c, &sample->range[c]);
+    for (uint32_t c = 0; c < sample->mode; c++)
+        find_range(sample, c, &sample->range[c]);
     if (has_names && option == NULL) {
         if (!columns_from_names(scan, sample, columns, &is_title, err)) return false;
         has_names = !is_title;
@@ -296,7 +320,9 @@ static mospt_type fit_type(const prep_text_range *r, mospt_type wanted, bool is_
     static const struct {
         mospt_type type;
         double low, high;
-    } types[] = {{MOSPT_U8, 0, 255}, {MOSPT_U16, 0, 65535}, {MOSPT_I16, -32768, 32767},
+    } types[] = {{MOSPT_U8, 0, 255},
+                 {MOSPT_U16, 0, 65535},
+                 {MOSPT_I16, -32768, 32767},
                  {MOSPT_I32, -2147483648.0, 2147483647.0}};
     if (wanted == MOSPT_F32 || wanted == MOSPT_F64) return wanted;
     for (size_t i = 0; i < sizeof types / sizeof types[0] && r->is_integer; i++) {
@@ -306,12 +332,13 @@ static mospt_type fit_type(const prep_text_range *r, mospt_type wanted, bool is_
     return is_intensity ? MOSPT_F32 : MOSPT_F64;
 }
 
-static void add_target(prep_scan *scan, text_state *text, const char *name, mospt_type type, const int *columns,
-                       uint32_t components)
+static void add_target(prep_scan *scan, text_state *text, const char *name, mospt_type type,
+                       const int *columns, uint32_t components)
 {
     int plane = prep_scan_add_attribute(scan, name, type, components);
     for (uint32_t c = 0; c < components && plane >= 0; c++)
-        text->target[text->target_count++] = (text_target){(uint32_t)columns[c], (uint32_t)plane, c, type};
+        text->target[text->target_count++] =
+            (text_target){(uint32_t)columns[c], (uint32_t)plane, c, type};
 }
 
 static void add_colour(prep_scan *scan, text_state *text, const text_sample *sample)
@@ -336,7 +363,8 @@ static void add_colour(prep_scan *scan, text_state *text, const text_sample *sam
         add_target(scan, text, "rgb_float", MOSPT_F32, text->rgb, 3);
 }
 
-static bool add_intensity(prep_scan *scan, text_state *text, const text_sample *sample, mospt_err *err)
+static bool add_intensity(prep_scan *scan, text_state *text, const text_sample *sample,
+                          mospt_err *err)
 {
     double *values = malloc(SAMPLE_MAX * sizeof *values);
     if (values == NULL) return mospt_err_nomem(err, SAMPLE_MAX * sizeof *values);
@@ -352,15 +380,25 @@ static bool add_intensity(prep_scan *scan, text_state *text, const text_sample *
     return true;
 }
 
-static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sample, mospt_err *err)
+/* All three or none: a line of names may be longer than the lines below it. */
+static void find_three(const prep_text_columns *columns, prep_text_meaning first, int out[3])
+{
+    bool is_whole = true;
+    for (int k = 0; k < 3; k++) {
+        out[k] = prep_text_columns_find(columns, (prep_text_meaning)((int)first + k));
+        is_whole = is_whole && out[k] >= 0;
+    }
+    if (!is_whole) out[0] = out[1] = out[2] = -1;
+}
+
+static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sample,
+                        mospt_err *err)
 {
     const prep_text_columns *columns = &text->columns;
     int normal[3];
-    for (int k = 0; k < 3; k++) {
-        text->xyz[k] = prep_text_columns_find(columns, (prep_text_meaning)(PREP_TEXT_X + k));
-        text->rgb[k] = prep_text_columns_find(columns, (prep_text_meaning)(PREP_TEXT_R + k));
-        normal[k] = prep_text_columns_find(columns, (prep_text_meaning)(PREP_TEXT_NX + k));
-    }
+    find_three(columns, PREP_TEXT_X, text->xyz);
+    find_three(columns, PREP_TEXT_R, text->rgb);
+    find_three(columns, PREP_TEXT_NX, normal);
     text->intensity = prep_text_columns_find(columns, PREP_TEXT_INTENSITY);
     if (text->intensity >= 0 && !add_intensity(scan, text, sample, err)) return false;
     if (text->rgb[0] >= 0) add_colour(scan, text, sample);
@@ -388,23 +426,27 @@ static void find_needed(text_state *text, const text_sample *sample)
     }
 }
 
-static bool understand(prep_scan *scan, text_sample *sample, const char *option, text_state *text, mospt_err *err)
+static bool understand(prep_scan *scan, text_sample *sample, const char *option, text_state *text,
+                       mospt_err *err)
 {
     if (!understand_columns(scan, sample, option, text, err)) return false;
     find_needed(text, sample);
     if (!check_share(scan, sample, text, err)) return false;
     for (int m = PREP_TEXT_X; m <= PREP_TEXT_Z; m++) {
-        if (prep_text_columns_find(&text->columns, (prep_text_meaning)m) < 0) return refuse(scan, sample, err);
+        if (prep_text_columns_find(&text->columns, (prep_text_meaning)m) < 0)
+            return refuse(scan, sample, err);
     }
     text->has_counts = sample->is_counted;
-    uint64_t room = prep_input_size(scan->input) / 6 + 1; /* a point takes at least "0 0 0" and the end of a line */
+    uint64_t room = prep_input_size(scan->input) / 6 +
+                    1; /* a point takes at least "0 0 0" and the end of a line */
     if (sample->counted < room) scan->info.point_count = sample->counted;
     snprintf(scan->info.format, sizeof scan->info.format, "text, %u columns", sample->mode);
     scan->info.is_text = true;
     return make_planes(scan, text, sample, err);
 }
 
-static bool text_open(prep_scan *scan, uint32_t index, const prep_scan_options *options, mospt_err *err)
+static bool text_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,
+                      mospt_err *err)
 {
     (void)index;
     text_state *text = calloc(1, sizeof *text);
@@ -413,8 +455,10 @@ static bool text_open(prep_scan *scan, uint32_t index, const prep_scan_options *
     text_sample *sample = calloc(1, sizeof *sample);
     if (sample == NULL) return mospt_err_nomem(err, sizeof *sample);
     sample->values = malloc((SAMPLE_MAX + 1) * sizeof *sample->values);
-    bool ok = sample->values != NULL || mospt_err_nomem(err, (SAMPLE_MAX + 1) * sizeof *sample->values);
-    ok = ok && take_sample(scan, sample, err) && understand(scan, sample, options->columns, text, err);
+    bool ok =
+        sample->values != NULL || mospt_err_nomem(err, (SAMPLE_MAX + 1) * sizeof *sample->values);
+    ok = ok && take_sample(scan, sample, err) &&
+         understand(scan, sample, options->columns, text, err);
     free(sample->values);
     free(sample);
     return ok;
@@ -424,12 +468,17 @@ static void store(const text_state *text, const double *values, prep_batch *batc
 {
     size_t i = batch->count++;
     uint8_t *rgbi = batch->rgbi + 4 * i;
-    for (int a = 0; a < 3; a++) batch->xyz[3 * i + (size_t)a] = values[text->xyz[a]];
-    memset(rgbi, text->intensity >= 0 && !text->tone.is_flat ? prep_tone_apply(&text->tone, values[text->intensity])
-                                                              : 255, 4);
+    for (int a = 0; a < 3; a++)
+        batch->xyz[3 * i + (size_t)a] = values[text->xyz[a]];
+    memset(rgbi,
+           text->intensity >= 0 && !text->tone.is_flat
+               ? prep_tone_apply(&text->tone, values[text->intensity])
+               : 255,
+           4);
     if (text->rgb_scale > 0) {
         prep_tone scale = {.scale = text->rgb_scale};
-        for (int c = 0; c < 3; c++) rgbi[c] = prep_tone_apply(&scale, values[text->rgb[c]]);
+        for (int c = 0; c < 3; c++)
+            rgbi[c] = prep_tone_apply(&scale, values[text->rgb[c]]);
     }
     for (uint32_t k = 0; k < text->target_count; k++) {
         const text_target *t = &text->target[k];
@@ -446,11 +495,13 @@ static void finish(prep_scan *scan, text_state *text)
         prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number), "%s", fault);
     if (text->taken < text->declared)
         prep_scan_set_damage(scan, mospt_at_line(scan->path, text->count_line),
-                             "%" PRIu64 " points are announced, %" PRIu64 " are there", text->declared, text->taken);
+                             "%" PRIu64 " points are announced, %" PRIu64 " are there",
+                             text->declared, text->taken);
 }
 
 /* A line that is no point: a count that announces the next block, or one that cannot be read. */
-static void take_other(prep_scan *scan, text_state *text, uint32_t columns, const double *values, uint64_t words)
+static void take_other(prep_scan *scan, text_state *text, uint32_t columns, const double *values,
+                       uint64_t words)
 {
     if (text->has_counts && columns == 1 && words == 0 && values[0] >= 0 && values[0] < 1e15) {
         text->declared += (uint64_t)values[0];
@@ -459,15 +510,20 @@ static void take_other(prep_scan *scan, text_state *text, uint32_t columns, cons
     }
     scan->dropped[PREP_DROP_UNREADABLE]++;
     text->taken++; /* it is there, though it cannot be used */
+    const char *fault = prep_input_fault(scan->input);
+    if (fault != NULL && text->lines.begin == text->lines.end) /* the line that it cut */
+        prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number), "%s", fault);
     prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number),
-                         "not a point: %u column%s%s, %u are needed", columns, columns == 1 ? "" : "s",
+                         "not a point: %u column%s%s, %u are needed", columns,
+                         columns == 1 ? "" : "s",
                          (words & text->needed_mask) != 0 ? " with words" : "", text->needed);
 }
 
 static bool text_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     text_state *text = scan->state;
-    if (text->lines.buffer == NULL && !prep_lines_init(&text->lines, scan->input, LINE_BUFFER_SIZE, 0, err))
+    if (text->lines.buffer == NULL &&
+        !prep_lines_init(&text->lines, scan->input, LINE_BUFFER_SIZE, 0, err))
         return false;
     while (batch->count < batch->capacity && !text->is_at_end) {
         const char *line;

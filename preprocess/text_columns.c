@@ -20,7 +20,8 @@ static inline bool is_separator(char c)
 
 static inline const char *skip_blanks(const char *p, const char *end)
 {
-    while (p < end && is_blank(*p)) p++;
+    while (p < end && is_blank(*p))
+        p++;
     return p;
 }
 
@@ -30,7 +31,8 @@ static const char *skip_word(const char *p, const char *end)
         const char *close = memchr(p + 1, '"', (size_t)(end - p - 1));
         return close != NULL ? close + 1 : end;
     }
-    while (p < end && !is_separator(*p)) p++;
+    while (p < end && !is_separator(*p))
+        p++;
     return p;
 }
 
@@ -83,8 +85,10 @@ uint32_t prep_text_split(const char *text, const char *end, double *values, uint
 
 static void copy_name(const char *p, const char *end, char out[PREP_TEXT_NAME_MAX])
 {
-    while (p < end && (is_blank(*p) || *p == '"')) p++;
-    while (end > p && (is_blank(end[-1]) || end[-1] == '"')) end--;
+    while (p < end && (is_blank(*p) || *p == '"'))
+        p++;
+    while (end > p && (is_blank(end[-1]) || end[-1] == '"'))
+        end--;
     size_t n = (size_t)(end - p) < PREP_TEXT_NAME_MAX ? (size_t)(end - p) : PREP_TEXT_NAME_MAX - 1;
     memcpy(out, p, n);
     out[n] = '\0';
@@ -93,9 +97,11 @@ static void copy_name(const char *p, const char *end, char out[PREP_TEXT_NAME_MA
 uint32_t prep_text_split_names(const char *text, const char *end, char names[][PREP_TEXT_NAME_MAX])
 {
     const char *p = skip_blanks(text, end);
-    while (p < end && (*p == '#' || *p == '/' || *p == '%')) p++;
+    while (p < end && (*p == '#' || *p == '/' || *p == '%'))
+        p++;
     p = skip_blanks(p, end);
-    while (end > p && (is_blank(end[-1]) || end[-1] == ',' || end[-1] == ';')) end--;
+    while (end > p && (is_blank(end[-1]) || end[-1] == ',' || end[-1] == ';'))
+        end--;
     const char *marks = " \t";
     if (memchr(p, '\t', (size_t)(end - p)) != NULL) marks = "\t";
     if (memchr(p, ';', (size_t)(end - p)) != NULL) marks = ";";
@@ -103,7 +109,8 @@ uint32_t prep_text_split_names(const char *text, const char *end, char names[][P
     uint32_t n = 0;
     while (p < end && n < PREP_TEXT_COLUMNS_MAX) {
         const char *stop = p;
-        while (stop < end && strchr(marks, *stop) == NULL) stop++;
+        while (stop < end && strchr(marks, *stop) == NULL)
+            stop++;
         copy_name(p, stop, names[n++]);
         p = stop < end ? stop + 1 : end;
         if (marks[0] == ' ') p = skip_blanks(p, end);
@@ -121,11 +128,13 @@ int prep_text_columns_find(const prep_text_columns *columns, prep_text_meaning m
 
 static bool has_xyz(const prep_text_columns *columns)
 {
-    return prep_text_columns_find(columns, PREP_TEXT_X) >= 0 && prep_text_columns_find(columns, PREP_TEXT_Y) >= 0 &&
+    return prep_text_columns_find(columns, PREP_TEXT_X) >= 0 &&
+           prep_text_columns_find(columns, PREP_TEXT_Y) >= 0 &&
            prep_text_columns_find(columns, PREP_TEXT_Z) >= 0;
 }
 
-/* Lower case letters and digits only, without a unit in brackets: "Return_Number" and "X [m]" are "returnnumber" and "x". */
+/* Lower case letters and digits only, without a unit in brackets: "Return_Number" and "X [m]" are
+ * "returnnumber" and "x". */
 static void simplify(const char *name, char out[PREP_TEXT_NAME_MAX])
 {
     size_t n = 0;
@@ -141,24 +150,58 @@ static const struct {
     prep_text_meaning meaning;
     int rank;
 } meanings[] = {
-    {"x", PREP_TEXT_X, 0},          {"y", PREP_TEXT_Y, 0},          {"z", PREP_TEXT_Z, 0},
-    {"easting", PREP_TEXT_X, 1},    {"northing", PREP_TEXT_Y, 1},   {"height", PREP_TEXT_Z, 2},
-    {"east", PREP_TEXT_X, 1},       {"north", PREP_TEXT_Y, 1},      {"elevation", PREP_TEXT_Z, 1},
-    {"xcoord", PREP_TEXT_X, 1},     {"ycoord", PREP_TEXT_Y, 1},     {"zcoord", PREP_TEXT_Z, 1},
-    {"xcoordinate", PREP_TEXT_X, 1}, {"ycoordinate", PREP_TEXT_Y, 1}, {"zcoordinate", PREP_TEXT_Z, 1},
-    {"cartesianx", PREP_TEXT_X, 1}, {"cartesiany", PREP_TEXT_Y, 1}, {"cartesianz", PREP_TEXT_Z, 1},
-    {"lon", PREP_TEXT_X, 3},        {"lat", PREP_TEXT_Y, 3},        {"elev", PREP_TEXT_Z, 2},
-    {"longitude", PREP_TEXT_X, 3},  {"latitude", PREP_TEXT_Y, 3},   {"altitude", PREP_TEXT_Z, 2},
-    {"longitude*", PREP_TEXT_X, 4}, {"latitude*", PREP_TEXT_Y, 4},  {"elevation*", PREP_TEXT_Z, 4},
-    {"alt", PREP_TEXT_Z, 3},        {"h", PREP_TEXT_Z, 3},          {"e", PREP_TEXT_X, 3},
-    {"red", PREP_TEXT_R, 0},        {"green", PREP_TEXT_G, 0},      {"blue", PREP_TEXT_B, 0},
-    {"r", PREP_TEXT_R, 1},          {"g", PREP_TEXT_G, 1},          {"b", PREP_TEXT_B, 1},
-    {"rf", PREP_TEXT_R, 2},         {"gf", PREP_TEXT_G, 2},         {"bf", PREP_TEXT_B, 2},
-    {"colorred", PREP_TEXT_R, 1},   {"colorgreen", PREP_TEXT_G, 1}, {"colorblue", PREP_TEXT_B, 1},
-    {"nx", PREP_TEXT_NX, 0},        {"ny", PREP_TEXT_NY, 0},        {"nz", PREP_TEXT_NZ, 0},
-    {"normalx", PREP_TEXT_NX, 1},   {"normaly", PREP_TEXT_NY, 1},   {"normalz", PREP_TEXT_NZ, 1},
-    {"intensity", PREP_TEXT_INTENSITY, 0},   {"scalarintensity", PREP_TEXT_INTENSITY, 1},
-    {"reflectance", PREP_TEXT_INTENSITY, 2}, {"i", PREP_TEXT_INTENSITY, 3},
+    {"x", PREP_TEXT_X, 0},
+    {"y", PREP_TEXT_Y, 0},
+    {"z", PREP_TEXT_Z, 0},
+    {"easting", PREP_TEXT_X, 1},
+    {"northing", PREP_TEXT_Y, 1},
+    {"height", PREP_TEXT_Z, 2},
+    {"east", PREP_TEXT_X, 1},
+    {"north", PREP_TEXT_Y, 1},
+    {"elevation", PREP_TEXT_Z, 1},
+    {"xcoord", PREP_TEXT_X, 1},
+    {"ycoord", PREP_TEXT_Y, 1},
+    {"zcoord", PREP_TEXT_Z, 1},
+    {"xcoordinate", PREP_TEXT_X, 1},
+    {"ycoordinate", PREP_TEXT_Y, 1},
+    {"zcoordinate", PREP_TEXT_Z, 1},
+    {"cartesianx", PREP_TEXT_X, 1},
+    {"cartesiany", PREP_TEXT_Y, 1},
+    {"cartesianz", PREP_TEXT_Z, 1},
+    {"lon", PREP_TEXT_X, 3},
+    {"lat", PREP_TEXT_Y, 3},
+    {"elev", PREP_TEXT_Z, 2},
+    {"longitude", PREP_TEXT_X, 3},
+    {"latitude", PREP_TEXT_Y, 3},
+    {"altitude", PREP_TEXT_Z, 2},
+    {"longitude*", PREP_TEXT_X, 4},
+    {"latitude*", PREP_TEXT_Y, 4},
+    {"elevation*", PREP_TEXT_Z, 4},
+    {"alt", PREP_TEXT_Z, 3},
+    {"h", PREP_TEXT_Z, 3},
+    {"e", PREP_TEXT_X, 3},
+    {"red", PREP_TEXT_R, 0},
+    {"green", PREP_TEXT_G, 0},
+    {"blue", PREP_TEXT_B, 0},
+    {"r", PREP_TEXT_R, 1},
+    {"g", PREP_TEXT_G, 1},
+    {"b", PREP_TEXT_B, 1},
+    {"rf", PREP_TEXT_R, 2},
+    {"gf", PREP_TEXT_G, 2},
+    {"bf", PREP_TEXT_B, 2},
+    {"colorred", PREP_TEXT_R, 1},
+    {"colorgreen", PREP_TEXT_G, 1},
+    {"colorblue", PREP_TEXT_B, 1},
+    {"nx", PREP_TEXT_NX, 0},
+    {"ny", PREP_TEXT_NY, 0},
+    {"nz", PREP_TEXT_NZ, 0},
+    {"normalx", PREP_TEXT_NX, 1},
+    {"normaly", PREP_TEXT_NY, 1},
+    {"normalz", PREP_TEXT_NZ, 1},
+    {"intensity", PREP_TEXT_INTENSITY, 0},
+    {"scalarintensity", PREP_TEXT_INTENSITY, 1},
+    {"reflectance", PREP_TEXT_INTENSITY, 2},
+    {"i", PREP_TEXT_INTENSITY, 3},
 };
 
 /* Attributes that have a name of their own in the field. */
@@ -204,7 +247,8 @@ static void set_attribute(prep_text_columns *columns, uint32_t c, const char *na
 }
 
 /* The surest column of each meaning gets it. */
-static void give_meaning(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning meaning, prep_text_columns *columns)
+static void give_meaning(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning meaning,
+                         prep_text_columns *columns)
 {
     int best_rank = 100, best = -1;
     for (uint32_t c = 0; c < columns->count; c++) {
@@ -220,8 +264,10 @@ static void give_meaning(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning mea
     if (best >= 0) columns->column[best].meaning = meaning;
 }
 
-/* A red without green and blue is no colour, nor is nx alone a normal: what is incomplete stays an attribute. */
-static void keep_whole(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning first, prep_text_columns *columns)
+/* A red without green and blue is no colour, nor is nx alone a normal: what is incomplete stays an
+ * attribute. */
+static void keep_whole(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning first,
+                       prep_text_columns *columns)
 {
     int at[3], found = 0;
     for (int k = 0; k < 3; k++) {
@@ -233,13 +279,15 @@ static void keep_whole(char names[][PREP_TEXT_NAME_MAX], prep_text_meaning first
     }
 }
 
-bool prep_text_columns_from_names(char names[][PREP_TEXT_NAME_MAX], uint32_t count, prep_text_columns *out)
+bool prep_text_columns_from_names(char names[][PREP_TEXT_NAME_MAX], uint32_t count,
+                                  prep_text_columns *out)
 {
     *out = (prep_text_columns){.count = count};
     for (uint32_t c = 0; c < count; c++) {
         if (strcmp(names[c], "-") != 0) set_attribute(out, c, names[c]);
     }
-    for (int m = PREP_TEXT_X; m <= PREP_TEXT_NZ; m++) give_meaning(names, (prep_text_meaning)m, out);
+    for (int m = PREP_TEXT_X; m <= PREP_TEXT_NZ; m++)
+        give_meaning(names, (prep_text_meaning)m, out);
     keep_whole(names, PREP_TEXT_R, out);
     keep_whole(names, PREP_TEXT_NX, out);
     return has_xyz(out);
@@ -250,13 +298,22 @@ bool prep_text_columns_from_extension(const char *path, uint32_t count, prep_tex
     static const struct {
         char letter;
         const char *name;
-    } letters[] = {{'c', "classification"}, {'i', "intensity"},  {'r', "return_number"}, {'n', "number_of_returns"},
-                   {'t', "gps_time"},       {'a', "scan_angle"}, {'u', "user_data"},     {'p', "point_source"},
-                   {'R', "red"},            {'G', "green"},      {'B', "blue"}};
+    } letters[] = {{'c', "classification"},
+                   {'i', "intensity"},
+                   {'r', "return_number"},
+                   {'n', "number_of_returns"},
+                   {'t', "gps_time"},
+                   {'a', "scan_angle"},
+                   {'u', "user_data"},
+                   {'p', "point_source"},
+                   {'R', "red"},
+                   {'G', "green"},
+                   {'B', "blue"}};
     size_t length = strlen(path);
     if (length > 3 && strcasecmp(path + length - 3, ".gz") == 0) length -= 3;
     size_t dot = length;
-    while (dot > 0 && path[dot - 1] != '.' && path[dot - 1] != '/') dot--;
+    while (dot > 0 && path[dot - 1] != '.' && path[dot - 1] != '/')
+        dot--;
     if (length - dot != count || count < 4 || count > PREP_TEXT_COLUMNS_MAX) return false;
     if (strncmp(path + dot, "xyz", 3) != 0) return false;
 
@@ -266,7 +323,8 @@ bool prep_text_columns_from_extension(const char *path, uint32_t count, prep_tex
         bool is_rgb = has_rgb && c < 6;
         char letter = is_rgb ? "RGB"[c - 3] : path[dot + c];
         size_t i = 0;
-        while (i < sizeof letters / sizeof letters[0] && letters[i].letter != letter) i++;
+        while (i < sizeof letters / sizeof letters[0] && letters[i].letter != letter)
+            i++;
         if (i == sizeof letters / sizeof letters[0]) return false;
         snprintf(names[c], PREP_TEXT_NAME_MAX, "%s", letters[i].name);
     }
@@ -290,7 +348,8 @@ static bool are_units(const prep_text_range *r, uint32_t first)
     return true;
 }
 
-static void set_run(prep_text_columns *columns, uint32_t first, prep_text_meaning meaning, uint32_t count)
+static void set_run(prep_text_columns *columns, uint32_t first, prep_text_meaning meaning,
+                    uint32_t count)
 {
     for (uint32_t k = 0; k < count; k++)
         columns->column[first + k].meaning = (prep_text_meaning)((uint32_t)meaning + k);

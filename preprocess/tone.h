@@ -1,19 +1,20 @@
 /* preprocess/tone.h - from raw measurements to the 8 bits that are shown.
  *
- * Scanners write intensity in any range (0..1, -2048..2047, 16 bits of which 300 are used), so the range to show is taken
- * from a sample of the scan. The raw value is kept beside it as an attribute; nothing is lost by the choice made here. */
+ * Scanners write intensity in any range (0..1, -2048..2047, 16 bits of which 300 are used), so the
+ * range to show is taken from a sample of the scan. The raw value is kept beside it as an
+ * attribute; nothing is lost by the choice made here. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 typedef struct {
-    bool is_flat; /* the sample holds one value only, or none: nothing to show */
+    bool is_flat;      /* the sample holds one value only, or none: nothing to show */
     double low, scale; /* shown = (value - low) * scale, rounded and clamped */
 } prep_tone;
 
-/* Chooses the range: integers up to 255 are shown as they are, all else is stretched between the 0.5 % and the 99.5 %
- * percentile, so that a single mirror reflection does not darken the scan.
+/* Chooses the range: integers up to 255 are shown as they are, all else is stretched between the
+ * 0.5 % and the 99.5 % percentile, so that a single mirror reflection does not darken the scan.
  * values   [count], reordered; NaN and infinities are passed over */
 prep_tone prep_tone_make(double *values, size_t count);
 
