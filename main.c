@@ -308,6 +308,7 @@ int main(int argc, char **argv)
     }
     if (!cli_options_read(command, argc - 1, argv + 1, &options, &err)) return misuse(command, err.message);
     if (options.help) return print_help(cli_command_help(command), stdout);
+    signal(SIGXFSZ, SIG_IGN); /* a file-size limit is an error of the write that meets it */
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     return run[command](&options);

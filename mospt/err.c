@@ -11,7 +11,7 @@ bool mospt_err_set(mospt_err *err, mospt_code code, mospt_where where, const cha
     int sys_errno = code == MOSPT_EIO ? errno : 0;
     if (err == NULL) return false;
     *err = (mospt_err){.code = code, .sys_errno = sys_errno};
-    err->place_kind = (int)where.kind;
+    err->place_kind = where.kind;
     err->place = where.place;
     if (where.file != NULL) snprintf(err->file, sizeof err->file, "%s", where.file);
 

@@ -17,9 +17,11 @@ typedef enum {
     MOSPT_ECANCELLED, /* the user asked to stop */
 } mospt_code;
 
+typedef enum { MOSPT_AT_FILE, MOSPT_AT_BYTE, MOSPT_AT_LINE } mospt_place_kind;
+
 typedef struct {
     const char *file; /* borrowed; NULL: no file is concerned */
-    enum { MOSPT_AT_FILE, MOSPT_AT_BYTE, MOSPT_AT_LINE } kind;
+    mospt_place_kind kind;
     uint64_t place; /* byte offset, or line number counted from 1 */
 } mospt_where;
 
@@ -27,7 +29,7 @@ typedef struct {
     mospt_code code;
     int sys_errno; /* 0 if the system has nothing to say */
     char file[1024];
-    int place_kind; /* MOSPT_AT_... */
+    mospt_place_kind place_kind;
     uint64_t place;
     char message[512];
 } mospt_err;

@@ -19,6 +19,17 @@ static uint32_t bits_for(double steps)
     return bits;
 }
 
+static void put_root(mospt_grid *grid, const double low[3], double step, uint32_t bits)
+{
+    uint32_t corner = root_corner(bits);
+    grid->step = step;
+    grid->bits = bits;
+    for (int a = 0; a < 3; a++) {
+        grid->root[a] = corner;
+        grid->base[a] = (int64_t)floor((low[a] - grid->offset[a]) / step) - (int64_t)corner;
+    }
+}
+
 bool mospt_grid_make(const double low[3], const double high[3], double step, const double offset[3],
                      mospt_grid *out, mospt_err *err)
 {
@@ -33,6 +44,8 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
         extent = fmax(extent, high[a] - low[a]);
         largest = fmax(largest, fmax(fabs(low[a] - grid.offset[a]), fabs(high[a] - grid.offset[a])));
     }
+    if (!isfinite(extent) || !isfinite(largest))
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), "bounds reach further than numbers do");
     if (!(step > 0)) {
         step = extent > 0 ? ldexp(1, (int)ceil(log2(extent)) - 30) : 0;
         /* A double holds 53 bits: a finer step than the last of them would only store noise. Points all at one position
@@ -40,19 +53,21 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
         step = fmax(step, largest > 0 ? ldexp(1, (int)ceil(log2(largest)) - 53) : 0x1p-20);
         step = fmax(step, 0x1p-1000);
     }
-    while (bits_for(ceil(extent / step) + 1) > MOSPT_GRID_BITS_MAX) step *= 2;
-    if (!(largest / step < 0x1p62))
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                             "coordinates up to %g need more than 2^62 steps of %g", largest, step);
-    grid.step = step;
-    grid.bits = bits_for(ceil(extent / step) + 1);
-    uint32_t corner = root_corner(grid.bits);
-    for (int a = 0; a < 3; a++) {
-        grid.root[a] = corner;
-        grid.base[a] = (int64_t)floor((low[a] - grid.offset[a]) / step) - (int64_t)corner;
+    for (;; step *= 2) {
+        uint32_t bits = bits_for(ceil(extent / step) + 1);
+        if (bits > MOSPT_GRID_BITS_MAX) continue;
+        if (!(largest / step < 0x1p62 - 0x1p33))
+            return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                                 "coordinates up to %g need more than 2^62 steps of %g", largest, step);
+        /* Where steps are finer than a double can tell, rounding may put the far corner further out. */
+        for (; bits <= MOSPT_GRID_BITS_MAX; bits++) {
+            uint32_t unused[3];
+            put_root(&grid, low, step, bits);
+            if (!mospt_grid_from_world(&grid, low, unused) || !mospt_grid_from_world(&grid, high, unused)) continue;
+            *out = grid;
+            return true;
+        }
     }
-    *out = grid;
-    return true;
 }
 
 bool mospt_grid_is_valid(const mospt_grid *grid)

@@ -72,7 +72,8 @@ static bool header_is_valid(const file_header *h, uint64_t file_size, const char
     return true;
 }
 
-static void node_from_record(const uint8_t *bytes, uint32_t levels, mospt_node *node)
+/* Returns false if bytes that mean nothing yet are not zero. */
+static bool node_from_record(const uint8_t *bytes, uint32_t levels, mospt_node *node)
 {
     file_record r;
     memcpy(&r, bytes, RECORD_FIXED_SIZE);
@@ -85,6 +86,7 @@ static void node_from_record(const uint8_t *bytes, uint32_t levels, mospt_node *
         .payload_file = r.payload_file, .codec = r.codec,
     };
     memcpy(node->level_end, bytes + RECORD_FIXED_SIZE, levels * sizeof(uint32_t));
+    return r.reserved_1 == 0 && r.reserved_2 == 0;
 }
 
 static void node_to_record(const mospt_node *node, uint32_t levels, uint8_t *bytes)
@@ -133,9 +135,12 @@ bool mospt_hierarchy_read(const char *path, const mospt_grid *grid, uint64_t exp
         mospt_err_nomem(err, h.count * sizeof *h.nodes);
         goto done;
     }
-    for (uint32_t i = 0; i < h.count; i++)
-        node_from_record((const uint8_t *)bytes + HEADER_SIZE + (size_t)i * header.record_size,
-                         h.inner_depth + 2, &h.nodes[i]);
+    for (uint32_t i = 0; i < h.count; i++) {
+        size_t at = HEADER_SIZE + (size_t)i * header.record_size;
+        if (node_from_record((const uint8_t *)bytes + at, h.inner_depth + 2, &h.nodes[i])) continue;
+        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(path, at), "reserved bytes of node %" PRIu32 " are not zero", i);
+        goto done;
+    }
     for (uint32_t i = 0; i < h.count; i++) {
         const mospt_node *n = &h.nodes[i];
         for (uint32_t c = 0; n->first_child < h.count && c < n->child_count && n->first_child + c < h.count; c++)

@@ -134,6 +134,13 @@ static void lay_out(mospt_schema *schema)
     }
 }
 
+static bool row_is_too_wide(const char *name, mospt_err *err)
+{
+    return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                         "more than %d bytes of attributes per point, the first one too many is %s", MOSPT_ROW_SIZE_MAX,
+                         name);
+}
+
 bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, uint32_t components,
                       mospt_err *err)
 {
@@ -144,7 +151,10 @@ bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, u
             return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                                  "attribute %s has %u values per point here and %u elsewhere", name,
                                  components, a->components);
-        a->type = mospt_type_common(a->type, type);
+        mospt_type common = mospt_type_common(a->type, type);
+        size_t wider = (mospt_type_size(common) - mospt_type_size(a->type)) * components;
+        if (schema->row_size + wider > MOSPT_ROW_SIZE_MAX) return row_is_too_wide(name, err);
+        a->type = common;
     } else {
         if (schema->count == MOSPT_ATTRIBUTES_MAX)
             return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
@@ -155,9 +165,7 @@ bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, u
                                  "attribute %s has %u values per point, 1 to 255 are possible", name,
                                  components);
         if (schema->row_size + mospt_type_size(type) * components > MOSPT_ROW_SIZE_MAX)
-            return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                                 "more than %d bytes of attributes per point, the first one too many is %s",
-                                 MOSPT_ROW_SIZE_MAX, name);
+            return row_is_too_wide(name, err);
         mospt_attribute *a = &schema->at[schema->count++];
         *a = (mospt_attribute){.type = type, .components = components};
         snprintf(a->name, sizeof a->name, "%s", name);

@@ -24,33 +24,47 @@ struct mospt_writer {
     uint64_t bytes;
 };
 
+/* Names that a build gives its files, and no others that only look like them. */
 static bool is_ours(const char *name)
 {
     unsigned number;
-    char rest[8];
+    char same[64];
     if (strcmp(name, "metadata.json.new") == 0) return true;
-    if (sscanf(name, "points-%u.%4s", &number, rest) == 2 && strcmp(rest, "bin") == 0) return true;
-    return sscanf(name, "hierarchy-%u.%7s", &number, rest) == 2;
+    if (sscanf(name, "points-%u", &number) == 1) {
+        snprintf(same, sizeof same, "points-%02u.bin", number);
+        return strcmp(name, same) == 0;
+    }
+    if (sscanf(name, "hierarchy-%u", &number) != 1) return false;
+    int length = snprintf(same, sizeof same, "hierarchy-%06u.bin", number);
+    return strncmp(name, same, (size_t)length) == 0 && (name[length] == '\0' || strcmp(name + length, ".new") == 0);
 }
 
-/* Removes what a build left; anything else in the folder is not ours to build among. */
-static bool clear_folder(const char *path, bool refuse_others, mospt_err *err)
+/* Calls for what a folder holds beside "." and ".."; the first false ends it. */
+static bool each_entry(const char *path, bool (*visit)(int folder, const char *path, const char *name, mospt_err *err),
+                       mospt_err *err)
 {
     bool ok = true;
     DIR *folder = opendir(path);
     if (folder == NULL) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be listed");
-    for (struct dirent *entry; ok && (entry = readdir(folder)) != NULL;) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0) continue;
-        if (is_ours(entry->d_name)) {
-            if (unlinkat(dirfd(folder), entry->d_name, 0) != 0)
-                ok = mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "%s cannot be removed", entry->d_name);
-        } else if (refuse_others) {
-            ok = mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
-                               "is a folder with other things in it (%s), not a place for a dataset", entry->d_name);
-        }
-    }
+    for (struct dirent *entry; ok && (entry = readdir(folder)) != NULL;)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            ok = visit(dirfd(folder), path, entry->d_name, err);
     closedir(folder);
     return ok;
+}
+
+static bool refuse_others(int folder, const char *path, const char *name, mospt_err *err)
+{
+    (void)folder;
+    if (is_ours(name)) return true;
+    return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
+                         "is a folder with other things in it (%s), not a place for a dataset", name);
+}
+
+static bool remove_ours(int folder, const char *path, const char *name, mospt_err *err)
+{
+    if (!is_ours(name) || unlinkat(folder, name, 0) == 0) return true;
+    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "%s cannot be removed", name);
 }
 
 bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **out, mospt_err *err)
@@ -59,7 +73,8 @@ bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "is a dataset already");
     if (mkdir(path, 0777) != 0) {
         if (errno != EEXIST) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
-        if (!clear_folder(path, true, err)) return false;
+        /* Nothing is removed before all has been looked at. */
+        if (!each_entry(path, refuse_others, err) || !each_entry(path, remove_ours, err)) return false;
     }
     mospt_writer *w = calloc(1, sizeof *w);
     if (w == NULL) return mospt_err_nomem(err, sizeof *w);
@@ -151,7 +166,7 @@ void mospt_writer_destroy(mospt_writer *w)
 {
     if (w == NULL) return;
     for (uint32_t i = 0; i < w->file_count; i++) close(w->fd[i]);
-    if (!w->committed && clear_folder(w->path, false, NULL)) rmdir(w->path);
+    if (!w->committed && each_entry(w->path, remove_ours, NULL)) rmdir(w->path);
     mospt_hierarchy_fini(&w->hierarchy);
     free(w->path);
     free(w);

@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { INNER_DEPTH_DEFAULT = 7, PACK_SLICE = 8192 };
+enum { PACK_SLICE = 8192 };
 
 typedef struct {
     const prep_build_options *options;
@@ -32,6 +32,7 @@ typedef struct {
     double phase_start;
     char *scratch_folder;     /* owned */
     char *target;             /* owned: the folder written to */
+    char *replaced;           /* owned: the dataset whose place it takes at the end; NULL: none */
 } build;
 
 const char *prep_phase_name(prep_phase phase)
@@ -99,11 +100,13 @@ static bool choose_folders(build *b, mospt_err *err)
     while (n > 1 && o->output[n - 1] == '/') n--;
     if (mospt_dataset_exists(o->output) && !o->force)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output), "is a dataset already; --force replaces it");
+    bool replaces = mospt_dataset_exists(o->output);
     b->target = malloc(n + 5);
+    b->replaced = replaces ? strndup(o->output, n) : NULL;
     b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : folder_of(o->output);
-    if (b->target == NULL || b->scratch_folder == NULL) return mospt_err_nomem(err, n);
+    if (b->target == NULL || b->scratch_folder == NULL || (replaces && b->replaced == NULL)) return mospt_err_nomem(err, n);
     memcpy(b->target, o->output, n);
-    strcpy(b->target + n, mospt_dataset_exists(o->output) ? ".new" : "");
+    strcpy(b->target + n, replaces ? ".new" : "");
     if (access(b->scratch_folder, W_OK | X_OK) != 0)
         return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
     return true;
@@ -128,16 +131,18 @@ static bool make_schema(build *b, mospt_err *err)
 }
 
 /* The step is that of the finest LAS file; floating-point scans beside it ask for a step of its size divided by a power of
- * two, so that the positions of both are kept. */
-static bool make_grid(build *b, mospt_err *err)
+ * two, so that the positions of both are kept.
+ * doubtful  out: header bounds reach too far for that step, and have not been held against the points yet */
+static bool make_grid(build *b, bool *doubtful, mospt_err *err)
 {
     const prep_source *source = &b->result->source;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     double step = 0, extent = 0;
     const double *offset = NULL;
-    bool any_float = false;
+    bool any_float = false, all_measured = true;
     for (uint32_t i = 0; i < source->scan_count; i++) {
         const prep_scan_info *info = &source->scans[i].info;
+        all_measured = all_measured && source->scans[i].measured;
         for (int a = 0; a < 3; a++) low[a] = fmin(low[a], info->low[a]), high[a] = fmax(high[a], info->high[a]);
         if (info->step > 0) {
             if (step == 0 || info->step < step) step = info->step;
@@ -148,7 +153,9 @@ static bool make_grid(build *b, mospt_err *err)
     }
     for (int a = 0; a < 3; a++) extent = fmax(extent, high[a] - low[a]);
     while (any_float && step > 0 && extent > 0 && step > ldexp(extent, -30)) step /= 2;
-    return mospt_grid_make(low, high, step, offset, &b->metadata->grid, err);
+    bool ok = mospt_grid_make(low, high, step, offset, &b->metadata->grid, err);
+    *doubtful = !all_measured && (!ok || (step > 0 && b->metadata->grid.step > step));
+    return ok || *doubtful;
 }
 
 static bool check_space(const char *folder, uint64_t needed, const char *what, mospt_err *err)
@@ -362,31 +369,25 @@ static bool check_conservation(const build *b, const mospt_metadata *m, mospt_er
                          (unsigned long long)m->points_hash, (unsigned long long)b->written.points_hash);
 }
 
-/* Puts the new dataset in the place of the old one, which is removed last. */
+/* Where a file system cannot exchange two folders, the old one waits under a name that nobody has until the new one stands. */
+static bool exchange_in_steps(const char *fresh, const char *old, mospt_err *err)
+{
+    char aside[4096];
+    if (snprintf(aside, sizeof aside, "%s.old-XXXXXX", old) >= (int)sizeof aside || mkdtemp(aside) == NULL ||
+        rename(old, aside) != 0)
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(old), "cannot be moved aside");
+    if (rename(fresh, old) == 0 && rename(aside, fresh) == 0) return true;
+    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(fresh), "cannot be put in place; the old dataset is %s", aside);
+}
+
+/* Puts the new dataset in the place of the old one, in one step where the system can, and removes the old one last. */
 static bool replace_output(build *b, mospt_err *err)
 {
-    size_t n = strlen(b->target);
-    if (strcmp(b->target + n - 4, ".new") != 0 || mospt_dataset_exists(b->options->output) == false) return true;
-    bool ok = false;
-    char *final = strndup(b->target, n - 4), *old = malloc(n + 1);
-    if (final == NULL || old == NULL) {
-        mospt_err_nomem(err, n);
-        goto done;
-    }
-    snprintf(old, n + 1, "%s.old", final);
-    if (!mospt_file_remove_tree(old, err)) goto done;
-    if (rename(final, old) != 0) {
-        mospt_err_set(err, MOSPT_EIO, mospt_at_file(final), "cannot be moved aside");
-        goto done;
-    }
-    if (rename(b->target, final) != 0) {
-        mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->target), "cannot be put in place; the old dataset is %s", old);
-        goto done;
-    }
-    ok = mospt_file_remove_tree(old, err);
-done:
-    free(final), free(old);
-    return ok;
+    if (b->replaced == NULL) return true;
+    if (renameat2(AT_FDCWD, b->target, AT_FDCWD, b->replaced, RENAME_EXCHANGE) != 0 &&
+        !exchange_in_steps(b->target, b->replaced, err))
+        return false;
+    return mospt_file_remove_tree(b->target, err);
 }
 
 static bool run(build *b, mospt_err *err)
@@ -400,9 +401,11 @@ static bool run(build *b, mospt_err *err)
     prep_pack_sums *of_scan = NULL;
     bool ok = false, outside = false;
 
-    b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : INNER_DEPTH_DEFAULT;
+    b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
     b->metadata->add_threshold = PREP_ADD_THRESHOLD;
     if (!choose_folders(b, err)) return false;
+    /* A place that cannot be had is known before the scans are read. */
+    if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
     if (!prep_folder_list_make(o->inputs, o->input_count, &b->result->files, err)) return false;
     if (!prep_source_open(&b->result->files, &scan_options, b->scratch_folder, source, err)) return false;
     if (!measure(b, false, err)) return false;
@@ -410,7 +413,6 @@ static bool run(build *b, mospt_err *err)
     if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth, &b->plan, err))
         return false;
     if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
-    if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
 
     of_scan = malloc(source->scan_count * sizeof *of_scan);
     if (of_scan == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *of_scan);
@@ -418,8 +420,9 @@ static bool run(build *b, mospt_err *err)
         /* Bounds that lie: measure all scans, and start again with what they really are. */
         if (outside && !measure(b, true, err)) goto done;
         for (uint32_t i = 0; i < source->scan_count; i++) of_scan[i] = prep_pack_sums_empty;
-        outside = false;
-        if (!make_grid(b, err) || !build_tree(b, of_scan, &outside, err)) goto done;
+        if (!make_grid(b, &outside, err)) goto done;
+        if (outside) continue;
+        if (!build_tree(b, of_scan, &outside, err)) goto done;
         if (outside && attempt > 0) {
             mospt_err_set(err, MOSPT_EIO, mospt_nowhere(), "the scans changed while they were read");
             goto done;
@@ -447,7 +450,7 @@ bool prep_build(const prep_build_options *options, prep_build_result *out, mospt
     if (getrusage(RUSAGE_SELF, &usage) == 0) out->peak_memory = (uint64_t)usage.ru_maxrss * 1024;
     mospt_writer_destroy(b.writer);
     prep_workers_destroy(b.workers);
-    free(b.scratch_folder), free(b.target);
+    free(b.scratch_folder), free(b.target), free(b.replaced);
     return ok;
 }
 

@@ -5,6 +5,8 @@
 #include "mospt/dataset.h"
 #include "preprocess/source.h"
 
+enum { PREP_INNER_DEPTH_DEFAULT = 7 };
+
 typedef enum { PREP_PHASE_MEASURE, PREP_PHASE_READ, PREP_PHASE_WRITE, PREP_PHASES } prep_phase;
 
 /* "measuring", "reading", "building" */

@@ -1,14 +1,17 @@
 #include "preprocess/las.h"
 
+#include "preprocess/laz.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 
 /* A block stays in the second-level cache while each attribute is picked from it in turn. */
-enum { BLOCK_SIZE = 256 * 1024, SAMPLE_BLOCKS = 64, SAMPLE_RECORDS = 1024 };
+enum { BLOCK_SIZE = 256 * 1024, SAMPLE_BLOCKS = 64, SAMPLE_RECORDS = 1024, LOOK_SIZE = 1024 * 1024 };
 
 typedef struct {
     prep_las_header header;
     prep_las_layout layout;
+    prep_laz *laz;  /* owned; NULL: the records are not compressed */
     uint64_t next;  /* point to read next */
     uint8_t *block; /* [block_records * record_length], owned, allocated by the first read */
     uint32_t block_records;
@@ -20,6 +23,16 @@ static bool alloc_block(las_state *las, mospt_err *err)
     las->block_records = length < BLOCK_SIZE ? BLOCK_SIZE / length : 1;
     if (las->block == NULL) las->block = malloc((size_t)las->block_records * length);
     return las->block != NULL || mospt_err_nomem(err, (size_t)las->block_records * length);
+}
+
+/* What was found wrong with the chunks so far becomes the damage of the scan. */
+static void note_laz_damage(prep_scan *scan, const prep_laz *laz)
+{
+    const mospt_err *damage = prep_laz_damage(laz);
+    if (damage == NULL) return;
+    mospt_where where = mospt_at_file(scan->path);
+    if (damage->place_kind == MOSPT_AT_BYTE) where = mospt_at_byte(scan->path, damage->place);
+    prep_scan_set_damage(scan, where, "%s", damage->message);
 }
 
 static uint64_t record_offset(const las_state *las, uint64_t point)
@@ -49,11 +62,39 @@ static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample
     return true;
 }
 
+/* The same of a compressed file, where the first records of a chunk are cheap to have, and others are
+ * not. They must be decoded: fewer will do. */
+static bool take_sample_of_chunks(las_state *las, prep_las_sample *sample, mospt_err *err)
+{
+    size_t length = las->header.record_length;
+    uint32_t count = prep_laz_chunk_count(las->laz);
+    uint32_t looks = count < SAMPLE_BLOCKS ? count : SAMPLE_BLOCKS;
+    size_t want = looks > 0 ? PREP_TONE_SAMPLES / looks : 0;
+    if (want > LOOK_SIZE / length) want = LOOK_SIZE / length;
+    uint8_t *records = malloc(want * length + 1);
+    if (records == NULL) return mospt_err_nomem(err, want * length);
+    bool ok = true;
+    for (uint32_t i = 0; i < looks && ok; i++) {
+        size_t got;
+        uint32_t chunk = (uint32_t)((uint64_t)count * i / looks);
+        ok = prep_laz_look(las->laz, chunk, records, want, &got, err);
+        if (ok) prep_las_sample_add(sample, &las->header, records, got);
+    }
+    free(records);
+    return ok;
+}
+
+static bool open_chunks(prep_scan *scan, las_state *las, mospt_err *err)
+{
+    if (!prep_laz_open(scan->input, &las->header, 0, &las->laz, err)) return false;
+    prep_laz_leave_out_waves(las->laz);
+    las->header.present = prep_laz_point_count(las->laz);
+    note_laz_damage(scan, las->laz);
+    return true;
+}
+
 static bool check_openable(prep_scan *scan, const prep_las_header *h, mospt_err *err)
 {
-    if (h->is_compressed)
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, 104),
-                             "LAZ compression is not read yet; unpack the file to LAS");
     if (h->declared == 0)
         return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
                              "the LAS file holds no points");
@@ -72,26 +113,43 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     scan->state = las;
     if (!prep_las_header_read(scan->input, &las->header, err)) return false;
     if (!check_openable(scan, &las->header, err)) return false;
+    if (las->header.is_compressed && !open_chunks(scan, las, err)) return false;
     prep_las_describe(scan, &las->header);
-    if (las->header.present < las->header.declared)
+    if (las->laz == NULL && las->header.present < las->header.declared)
         prep_scan_set_damage(
             scan, mospt_at_byte(scan->path, record_offset(las, las->header.present)),
             "the file ends here: the header claims %" PRIu64 " points, %" PRIu64 " are there",
             las->header.declared, las->header.present);
 
     prep_las_sample sample;
-    uint64_t sampled = SAMPLE_BLOCKS * SAMPLE_RECORDS;
+    uint64_t sampled = las->laz != NULL ? PREP_TONE_SAMPLES : SAMPLE_BLOCKS * SAMPLE_RECORDS;
     if (las->header.present < sampled) sampled = las->header.present;
     if (!prep_las_sample_init(&sample, sampled, err)) return false;
-    bool ok = take_sample(scan, las, &sample, err);
+    bool ok = las->laz != NULL ? take_sample_of_chunks(las, &sample, err)
+                               : take_sample(scan, las, &sample, err);
     if (ok) prep_las_layout_make(scan, &las->header, &sample, &las->layout);
     prep_las_sample_fini(&sample);
     return ok;
 }
 
+static bool read_chunks(prep_scan *scan, las_state *las, prep_batch *batch, mospt_err *err)
+{
+    while (batch->count < batch->capacity) {
+        const uint8_t *records;
+        size_t count;
+        if (!prep_laz_read(las->laz, batch->capacity - batch->count, &records, &count, err))
+            return false;
+        if (count == 0) break;
+        prep_las_decode(&las->layout, records, (uint32_t)count, batch);
+    }
+    note_laz_damage(scan, las->laz);
+    return true;
+}
+
 static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     las_state *las = scan->state;
+    if (las->laz != NULL) return read_chunks(scan, las, batch, err);
     if (!alloc_block(las, err)) return false;
     uint64_t length = las->header.record_length;
     while (batch->count < batch->capacity && las->next < las->header.present) {
@@ -115,7 +173,9 @@ static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 static bool las_rewind(prep_scan *scan, mospt_err *err)
 {
     (void)err;
-    ((las_state *)scan->state)->next = 0;
+    las_state *las = scan->state;
+    las->next = 0;
+    if (las->laz != NULL) prep_laz_rewind(las->laz);
     return true;
 }
 
@@ -123,6 +183,7 @@ static void las_close(prep_scan *scan)
 {
     las_state *las = scan->state;
     if (las == NULL) return;
+    prep_laz_close(las->laz);
     free(las->block);
     free(las);
 }

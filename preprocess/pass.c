@@ -67,6 +67,7 @@ bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_
     p->levels = env->levels;
     if (p->levels > cell_bits) p->levels = cell_bits;
     if (p->levels > depth) p->levels = depth;
+    while (p->levels > 1 && 3 * (p->levels + depth - 1) > 32) p->levels--; /* codes of a pass are 32 bits */
     p->code_levels = p->levels + depth - 1;
     p->bucket_count = 1u << 3 * p->levels;
     for (uint32_t j = 0; j < p->levels; j++) {

@@ -1,0 +1,336 @@
+#include "render/camera.h"
+
+#include <cglm/cglm.h>
+#include <math.h>
+#include <stdlib.h>
+
+#define FOV_DEFAULT_RAD (60 * 3.14159265358979323846 / 180)
+#define RAD_PER_DEG (3.14159265358979323846 / 180)
+
+static double dot3(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross3(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static bool normalise3(double v[3])
+{
+    double length = sqrt(dot3(v, v));
+    if (!(length > 0) || !isfinite(length)) return false;
+    for (int a = 0; a < 3; a++)
+        v[a] /= length;
+    return true;
+}
+
+/* `up` projected off `back`; where they are parallel, the axis that is least so takes its place. */
+static void axes_from(const double direction[3], const double up_wanted[3], double right[3],
+                      double up[3], double back[3])
+{
+    for (int a = 0; a < 3; a++)
+        back[a] = -direction[a];
+    if (!normalise3(back)) back[0] = 0, back[1] = -1, back[2] = 0;
+    double wanted[3] = {up_wanted[0], up_wanted[1], up_wanted[2]};
+    if (!normalise3(wanted)) wanted[0] = 0, wanted[1] = 0, wanted[2] = 1;
+    cross3(wanted, back, right);
+    if (dot3(right, right) < 1e-12) {
+        double other[3] = {0, fabs(back[1]) < 0.9 ? 1 : 0, fabs(back[1]) < 0.9 ? 0 : 1};
+        cross3(other, back, right);
+    }
+    normalise3(right);
+    cross3(back, right, up);
+}
+
+void rend_camera_axes(const rend_camera *camera, double right[3], double up[3], double back[3])
+{
+    double direction[3];
+    for (int a = 0; a < 3; a++)
+        direction[a] = camera->target[a] - camera->eye[a];
+    axes_from(direction, camera->up, right, up, back);
+}
+
+/* The tightest view along a fixed direction: the eye stands where the planes through the outermost
+ * corners meet. Done relative to the middle of the box, so that no digit is lost at UTM
+ * coordinates. */
+void rend_camera_overview(const double low[3], const double high[3], double aspect, double fov_rad,
+                          rend_camera *out)
+{
+    enum { MARGIN_PERCENT = 4 };
+    double half[3], size = 0;
+    for (int a = 0; a < 3; a++) {
+        out->target[a] = low[a] + 0.5 * (high[a] - low[a]);
+        half[a] = 0.5 * (high[a] - low[a]);
+        size = fmax(size, half[a]);
+    }
+    if (!(size > 0)) size = fmax(fabs(out->target[0]), 1) * 1e-6;
+    for (int a = 0; a < 3; a++)
+        half[a] = fmax(half[a], 1e-3 * size);
+
+    /* 34 degrees down, and a little across, so that two sides of every house show. */
+    double turn = (half[1] > 1.3 * half[0] ? -160.0 : -110.0) * RAD_PER_DEG,
+           pitch = 34 * RAD_PER_DEG;
+    double direction[3] = {-cos(turn) * cos(pitch), -sin(turn) * cos(pitch), -sin(pitch)};
+    double right[3], up[3], back[3];
+    for (int a = 0; a < 3; a++)
+        out->up[a] = a == 2;
+    axes_from(direction, out->up, right, up, back);
+
+    double ty = tan(0.5 * fov_rad) * (1 - 0.01 * MARGIN_PERCENT), tx = ty * aspect;
+    double reach[4] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    for (int corner = 0; corner < 8; corner++) {
+        double p[3];
+        for (int a = 0; a < 3; a++)
+            p[a] = (corner >> a & 1) ? half[a] : -half[a];
+        double x = dot3(p, right), y = dot3(p, up), z = dot3(p, back);
+        reach[0] = fmax(reach[0], x + tx * z), reach[1] = fmax(reach[1], -x + tx * z);
+        reach[2] = fmax(reach[2], y + ty * z), reach[3] = fmax(reach[3], -y + ty * z);
+    }
+    double ex = 0.5 * (reach[0] - reach[1]), ey = 0.5 * (reach[2] - reach[3]);
+    double ez = fmax((reach[0] + reach[1]) / (2 * tx), (reach[2] + reach[3]) / (2 * ty));
+    for (int a = 0; a < 3; a++) {
+        double shift = right[a] * ex + up[a] * ey;
+        out->eye[a] = out->target[a] + shift + back[a] * ez;
+        out->target[a] += shift;
+    }
+    out->fov_rad = fov_rad;
+}
+
+enum { BINS = 1024, TRIM_ROUNDS = 12 };
+
+/* Adds a node's points to the bins of one axis, spread evenly over its cube. */
+static void spread(const mospt_grid *grid, const mospt_node *node, int axis, double low,
+                   double bin_width, double bins[BINS])
+{
+    double from = ((double)node->corner[axis] - low) / bin_width;
+    double width = (double)mospt_cell_width(grid, node->level) / bin_width;
+    int first = (int)fmax(floor(from), 0), last = (int)fmin(floor(from + width), BINS - 1);
+    for (int b = first; b <= last; b++)
+        bins[b] += node->count / (double)(last - first + 1);
+}
+
+/* Fills the bins of one axis; returns how many points are in them. Only nodes that are small
+ * against the range say where points are; those of the upper levels are spread over all of it. */
+static double fill_bins(const mospt_dataset *dataset, int axis, double low, double high,
+                        double bins[BINS])
+{
+    const mospt_hierarchy *h = &dataset->hierarchy;
+    double sum = 0;
+    memset(bins, 0, BINS * sizeof *bins);
+    for (uint32_t n = 0; n < h->count; n++) {
+        if ((double)mospt_cell_width(&dataset->metadata.grid, h->nodes[n].level) >
+            (high - low) / 16)
+            continue;
+        spread(&dataset->metadata.grid, &h->nodes[n], axis, low, (high - low) / BINS, bins);
+        sum += h->nodes[n].count;
+    }
+    return sum;
+}
+
+/* The bins left when those at both ends are cut off that hold less than `share` of the points. */
+static void trim_bins(const double bins[BINS], double share, int *first, int *last)
+{
+    *first = 0, *last = BINS - 1;
+    for (double below = bins[0]; below < share && *first < *last; below += bins[*first])
+        ++*first;
+    for (double above = bins[*last]; above < share && *first < *last; above += bins[*last])
+        --*last;
+}
+
+/* One round of trimming along one axis. */
+static bool trim_axis(const mospt_dataset *dataset, int axis, double *low, double *high)
+{
+    double bins[BINS], bin_width = (*high - *low) / BINS;
+    int first, last;
+    if (!(bin_width > 1)) return false;
+    double sum = fill_bins(dataset, axis, *low, *high, bins);
+    if (sum < 0.8 * (double)dataset->hierarchy.point_count) return false;
+    trim_bins(bins, 1e-3 * sum, &first, &last);
+    /* A few metres less are no reason: an overview shows all of a site that has no outliers. */
+    if (last + 1 - first > BINS / 2) return false;
+    *high = *low + bin_width * (last + 1);
+    *low += bin_width * first;
+    return true;
+}
+
+void rend_camera_heights(const mospt_dataset *dataset, uint32_t *low, uint32_t *high)
+{
+    uint32_t box_low[3], box_high[3];
+    double bins[BINS];
+    int first, last;
+    rend_frame_bounds(dataset, box_low, box_high);
+    *low = box_low[2], *high = box_high[2];
+    double from = *low, width = ((double)*high - from) / BINS;
+    double sum = fill_bins(dataset, 2, from, (double)*high, bins);
+    if (!(width > 1) || sum < 0.5 * (double)dataset->hierarchy.point_count) return;
+    trim_bins(bins, 0.01 * sum, &first, &last);
+    *low = (uint32_t)(from + width * first);
+    *high = (uint32_t)fmin(from + width * (last + 1), UINT32_MAX);
+}
+
+void rend_camera_bounds(const mospt_dataset *dataset, double low[3], double high[3])
+{
+    const mospt_grid *grid = &dataset->metadata.grid;
+    uint32_t box_low[3], box_high[3];
+    rend_frame_bounds(dataset, box_low, box_high);
+    for (int a = 0; a < 3; a++) {
+        double from = box_low[a], to = (double)box_high[a];
+        bool again = true;
+        for (int round = 0; again && round < TRIM_ROUNDS; round++)
+            again = trim_axis(dataset, a, &from, &to);
+        low[a] = mospt_grid_axis_to_world(grid, a, (uint32_t)from);
+        high[a] = mospt_grid_axis_to_world(grid, a, (uint32_t)fmin(ceil(to), UINT32_MAX));
+    }
+}
+
+static bool finite3(const double v[3])
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+/* Puts what is given over the overview. An eye without a target keeps looking at the middle of the
+ * site; a target without an eye keeps the overview's direction and distance. */
+static void override(const rend_camera_options *options, const double middle[3],
+                     rend_camera *camera)
+{
+    for (int a = 0; a < 3; a++) {
+        double away = camera->eye[a] - camera->target[a];
+        if (options->has_eye) {
+            camera->eye[a] = options->eye[a];
+            camera->target[a] = options->has_target ? options->target[a] : middle[a];
+        } else if (options->has_target) {
+            camera->target[a] = options->target[a];
+            camera->eye[a] = options->target[a] + away;
+        }
+        if (options->has_up) camera->up[a] = options->up[a];
+    }
+}
+
+bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *dataset,
+                      uint32_t width, uint32_t height, rend_camera *out, mospt_err *err)
+{
+    if ((options->has_eye && !finite3(options->eye)) ||
+        (options->has_target && !finite3(options->target)) ||
+        (options->has_up && !finite3(options->up)))
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "eye, target and up must be finite numbers");
+    if (options->has_up && !(dot3(options->up, options->up) > 0))
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), "the up direction is zero");
+    if (options->has_fov && !(options->fov_deg >= 1 && options->fov_deg <= 170))
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "a field of view of %g degrees is not between 1 and 170",
+                             options->fov_deg);
+    rend_camera camera;
+    double low[3], high[3], middle[3];
+    rend_camera_bounds(dataset, low, high);
+    for (int a = 0; a < 3; a++)
+        middle[a] = low[a] + 0.5 * (high[a] - low[a]);
+    rend_camera_overview(low, high, (double)width / height,
+                         options->has_fov ? options->fov_deg * RAD_PER_DEG : FOV_DEFAULT_RAD,
+                         &camera);
+    override(options, middle, &camera);
+    if (camera.eye[0] == camera.target[0] && camera.eye[1] == camera.target[1] &&
+        camera.eye[2] == camera.target[2])
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "the eye is on its target, %g %g %g", camera.eye[0], camera.eye[1],
+                             camera.eye[2]);
+    *out = camera;
+    return true;
+}
+
+void rend_frame_bounds(const mospt_dataset *dataset, uint32_t low[3], uint32_t high[3])
+{
+    const mospt_grid *grid = &dataset->metadata.grid;
+    if (mospt_grid_from_world(grid, dataset->metadata.low, low) &&
+        mospt_grid_from_world(grid, dataset->metadata.high, high) && low[0] <= high[0] &&
+        low[1] <= high[1] && low[2] <= high[2])
+        return;
+    for (int a = 0; a < 3; a++) {
+        low[a] = grid->root[a];
+        high[a] = (uint32_t)(grid->root[a] + (mospt_cell_width(grid, 0) - 1));
+    }
+}
+
+/* A world position in steps, on the lattice that the header promises. */
+static void to_lattice(const mospt_grid *grid, const double world[3], double out[3])
+{
+    double lattice = ldexp(1, (int)grid->bits - 28);
+    for (int a = 0; a < 3; a++) {
+        double steps = (world[a] - grid->offset[a]) / grid->step - (double)grid->base[a];
+        out[a] = nearbyint(steps / lattice) * lattice;
+    }
+}
+
+static void set_planes(rend_frame *f)
+{
+    /* Normals in eye axes; the last one is the view direction. Grid axes are the rows of R's
+     * transpose. */
+    float tx = f->tan_half[0], ty = f->tan_half[1];
+    float nx = 1 / sqrtf(1 + tx * tx), ny = 1 / sqrtf(1 + ty * ty);
+    float normal[5][3] = {
+        {nx, 0, -tx * nx}, {-nx, 0, -tx * nx}, {0, ny, -ty * ny}, {0, -ny, -ty * ny}, {0, 0, -1}};
+    for (int p = 0; p < 5; p++) {
+        f->plane_reach[p] = 0;
+        for (int a = 0; a < 3; a++) {
+            const float *column = f->rotation + 3 * a;
+            f->plane[p][a] =
+                column[0] * normal[p][0] + column[1] * normal[p][1] + column[2] * normal[p][2];
+            f->plane_reach[p] += fabsf(f->plane[p][a]);
+        }
+    }
+}
+
+/* Near is a ten-millionth of far at least: beyond that, a float's depth would have nothing to say.
+ */
+static void set_range(rend_frame *f, const uint32_t low[3], const uint32_t high[3])
+{
+    double nearest = INFINITY, farthest = -INFINITY;
+    for (int corner = 0; corner < 8; corner++) {
+        double w = 0;
+        for (int a = 0; a < 3; a++)
+            w += f->plane[4][a] * ((double)((corner >> a & 1) ? high[a] : low[a]) - f->eye[a]);
+        nearest = fmin(nearest, w), farthest = fmax(farthest, w);
+    }
+    farthest = fmax(farthest * 1.001 + 1, 2);
+    f->far_w = (float)farthest;
+    f->near_w = (float)fmax(nearest * 0.999 - 1, fmax(farthest * 1e-7, 1e-3));
+}
+
+void rend_frame_make(const rend_camera *camera, const mospt_grid *grid, const uint32_t low[3],
+                     const uint32_t high[3], uint32_t width, uint32_t height, rend_frame *out)
+{
+    rend_frame f = {.width = width, .height = height};
+    double target[3], direction[3], right[3], up[3], back[3];
+    to_lattice(grid, camera->eye, f.eye);
+    to_lattice(grid, camera->target, target);
+    for (int a = 0; a < 3; a++) {
+        direction[a] = target[a] - f.eye[a];
+        double nearest = fmin(fmax(nearbyint(f.eye[a]), 0), UINT32_MAX);
+        f.anchor[a] = (uint32_t)nearest;
+        f.offset[a] = (float)(nearest - f.eye[a]);
+    }
+    axes_from(direction, camera->up, right, up, back);
+    mat3 rotation;
+    for (int a = 0; a < 3; a++) {
+        rotation[a][0] = (float)right[a];
+        rotation[a][1] = (float)up[a];
+        rotation[a][2] = (float)back[a];
+    }
+    memcpy(f.rotation, rotation, sizeof f.rotation);
+    f.tan_half[1] = (float)tan(0.5 * camera->fov_rad);
+    f.tan_half[0] = f.tan_half[1] * (float)width / (float)height;
+    f.focal_px = 0.5f * (float)height / f.tan_half[1];
+    f.corner_cos = 1 / sqrtf(1 + f.tan_half[0] * f.tan_half[0] + f.tan_half[1] * f.tan_half[1]);
+    set_planes(&f);
+    set_range(&f, low, high);
+    *out = f;
+}
+
+float rend_frame_depth_to_w(const rend_frame *frame, float depth)
+{
+    return frame->near_w * powf(frame->far_w / frame->near_w, depth);
+}

@@ -1,0 +1,20 @@
+/* render/gl/driver.h - what a backend of rgl.h provides. Each starts with a struct rgl. */
+#pragma once
+#include "render/gl/rgl.h"
+
+typedef struct {
+    void (*destroy)(rgl *gl);
+    const char *(*renderer)(const rgl *gl);
+    bool (*arena_create)(rgl *gl, uint64_t vertex_count, mospt_err *err);
+    bool (*arena_upload)(rgl *gl, uint64_t first, const mospt_vertex *vertices, uint32_t count,
+                         mospt_err *err);
+    bool (*draw)(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
+                 int parts, mospt_err *err);
+    bool (*read_pixels)(rgl *gl, bool from_window, uint32_t width, uint32_t height, uint8_t *rgb,
+                        mospt_err *err);
+    bool (*read_depth)(rgl *gl, int x, int y, int radius, float *out, mospt_err *err);
+} rgl_driver;
+
+struct rgl {
+    const rgl_driver *driver;
+};

@@ -1,0 +1,129 @@
+/* A backend that draws nothing and forgets nothing: the arena is plain memory, and every vertex
+ * drawn goes into a hash. */
+#include "render/gl/driver.h"
+
+#include "mospt/hash.h"
+
+#include <stdlib.h>
+
+typedef struct {
+    rgl base;
+    mospt_vertex *arena; /* [size], owned */
+    uint64_t size;
+    rgl_record record;
+} null_rgl;
+
+static void null_destroy(rgl *gl)
+{
+    free(((null_rgl *)gl)->arena);
+    free(gl);
+}
+
+static const char *null_renderer(const rgl *gl)
+{
+    (void)gl;
+    return "null";
+}
+
+static bool null_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
+{
+    null_rgl *n = (null_rgl *)gl;
+    mospt_vertex *arena = calloc(vertex_count + 1, sizeof *arena);
+    if (arena == NULL) return mospt_err_nomem(err, vertex_count * sizeof *arena);
+    free(n->arena);
+    n->arena = arena, n->size = vertex_count;
+    return true;
+}
+
+static bool null_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertices, uint32_t count,
+                              mospt_err *err)
+{
+    (void)err;
+    null_rgl *n = (null_rgl *)gl;
+    if (first > n->size || count > n->size - first) return n->record.overruns++, true;
+    memcpy(n->arena + first, vertices, count * sizeof *vertices);
+    n->record.points_uploaded += count;
+    return true;
+}
+
+static void record_vertex(null_rgl *n, const rgl_batch *batch, const mospt_vertex *vertex)
+{
+    struct {
+        uint64_t before;
+        mospt_vertex vertex;
+        uint64_t round;
+    } link = {n->record.sequence_hash, *vertex, batch->round};
+    n->record.sequence_hash = mospt_hash(&link, sizeof link);
+    n->record.points_drawn++;
+}
+
+static void record_batch(null_rgl *n, const rgl_batch *batch)
+{
+    n->record.batches++;
+    for (uint32_t r = 0; r < batch->range_count; r++) {
+        uint64_t first = (uint64_t)batch->first[r], count = (uint64_t)batch->count[r];
+        n->record.ranges++;
+        if (batch->first[r] < 0 || batch->count[r] < 0 || first + count > n->size) {
+            n->record.overruns++;
+            continue;
+        }
+        for (uint64_t v = 0; v < count; v++)
+            record_vertex(n, batch, &n->arena[first + v]);
+    }
+}
+
+static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
+                      uint32_t batch_count, int parts, mospt_err *err)
+{
+    (void)err;
+    null_rgl *n = (null_rgl *)gl;
+    if (parts & RGL_BEGIN) {
+        size_t size = 8 * sizeof *scene->octants * scene->octant_nodes;
+        n->record.octants_hash = scene->octants != NULL ? mospt_hash(scene->octants, size) : 0;
+        n->record.begins++;
+    }
+    n->record.ends += (parts & RGL_END) != 0;
+    for (uint32_t b = 0; b < batch_count; b++)
+        record_batch(n, &batches[b]);
+    return true;
+}
+
+static bool null_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height,
+                             uint8_t *rgb, mospt_err *err)
+{
+    (void)gl, (void)from_window, (void)err;
+    memset(rgb, 0, (size_t)width * height * 3);
+    return true;
+}
+
+static bool null_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err)
+{
+    (void)gl, (void)x, (void)y, (void)err;
+    for (int i = 0; i < (2 * radius + 1) * (2 * radius + 1); i++)
+        out[i] = 1;
+    return true;
+}
+
+static const rgl_driver NULL_DRIVER = {
+    .destroy = null_destroy,
+    .renderer = null_renderer,
+    .arena_create = null_arena_create,
+    .arena_upload = null_arena_upload,
+    .draw = null_draw,
+    .read_pixels = null_read_pixels,
+    .read_depth = null_read_depth,
+};
+
+bool rgl_null_create(rgl **out, mospt_err *err)
+{
+    null_rgl *n = calloc(1, sizeof *n);
+    if (n == NULL) return mospt_err_nomem(err, sizeof *n);
+    n->base.driver = &NULL_DRIVER;
+    *out = &n->base;
+    return true;
+}
+
+rgl_record rgl_null_record(const rgl *gl)
+{
+    return ((const null_rgl *)gl)->record;
+}

@@ -1,0 +1,28 @@
+/* render/gl/program.h - shader programs, and the check behind every GL call of debug builds. */
+#pragma once
+#include "mospt/err.h"
+
+#include <epoxy/gl.h>
+
+/* Compiles and links.
+ * defines  lines put after the #version of both shaders
+ * errors   MOSPT_EIO with the first lines of the driver's log */
+bool rgl_program_create(const char *defines, const char *vertex, const char *fragment, GLuint *out,
+                        mospt_err *err);
+
+extern const char RGL_POINTS_VERTEX[], RGL_POINTS_FRAGMENT[];
+extern const char RGL_SCREEN_VERTEX[], RGL_SHADE_FRAGMENT[];
+extern const char RGL_TEXT_VERTEX[], RGL_TEXT_FRAGMENT[];
+
+#ifdef NDEBUG
+#define GL(call) call
+#else
+/* Stops at our own mistakes; running out of memory is the caller's to handle and is left for its
+ * glGetError(). */
+void rgl_check(const char *call, const char *file, int line);
+#define GL(call)                                                                                   \
+    do {                                                                                           \
+        call;                                                                                      \
+        rgl_check(#call, __FILE__, __LINE__);                                                      \
+    } while (0)
+#endif

@@ -1,0 +1,39 @@
+#include "render/gl/driver.h"
+
+void rgl_destroy(rgl *gl)
+{
+    if (gl != NULL) gl->driver->destroy(gl);
+}
+
+const char *rgl_renderer(const rgl *gl)
+{
+    return gl->driver->renderer(gl);
+}
+
+bool rgl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
+{
+    return gl->driver->arena_create(gl, vertex_count, err);
+}
+
+bool rgl_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertices, uint32_t count,
+                      mospt_err *err)
+{
+    return gl->driver->arena_upload(gl, first, vertices, count, err);
+}
+
+bool rgl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
+              int parts, mospt_err *err)
+{
+    return gl->driver->draw(gl, scene, batches, batch_count, parts, err);
+}
+
+bool rgl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height, uint8_t *rgb,
+                     mospt_err *err)
+{
+    return gl->driver->read_pixels(gl, from_window, width, height, rgb, err);
+}
+
+bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err)
+{
+    return gl->driver->read_depth(gl, x, y, radius, out, err);
+}

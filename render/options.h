@@ -1,0 +1,62 @@
+/* render/options.h - what a user may choose about a picture. In every struct {0} is a sensible
+ * default. */
+#pragma once
+#include "mospt/err.h"
+
+#define REND_MIB (UINT64_C(1) << 20)
+#define REND_ALL UINT64_MAX /* as a point budget: no limit */
+
+enum {
+    REND_WIDTH_DEFAULT = 1280,
+    REND_HEIGHT_DEFAULT = 720,
+    REND_SIZE_MAX = 16384, /* pixels along one side of a picture */
+};
+
+typedef struct {
+    /* What is not given comes from the overview of the dataset. */
+    bool has_eye, has_target, has_up, has_fov;
+    double eye[3], target[3]; /* world, metres */
+    double up[3];             /* any length; z without it */
+    double fov_deg;           /* vertical, 1 to 170; 60 without it */
+} rend_camera_options;
+
+typedef enum {
+    REND_COLOUR_RGB,
+    REND_COLOUR_INTENSITY,
+    REND_COLOUR_ELEVATION,
+    REND_COLOUR_COUNT
+} rend_colour;
+typedef enum {
+    REND_SIZE_AUTO,  /* splat size follows the cells that are drawn, section 5.3 of the paper */
+    REND_SIZE_FIXED, /* point_px pixels for every point */
+    REND_SIZE_WORLD, /* point_m metres for every point, section 3 */
+} rend_size_mode;
+
+typedef struct {
+    rend_size_mode size_mode;
+    float point_px;     /* REND_SIZE_FIXED; 0: 1 */
+    float point_m;      /* REND_SIZE_WORLD, in the unit of the world coordinates */
+    float point_px_max; /* no splat is larger; 0: REND_POINT_PX_MAX_DEFAULT */
+    rend_colour colour;
+    bool no_edl;         /* eye-dome lighting off */
+    float edl_strength;  /* 0: 1; 2 is twice as dark */
+    float edl_radius_px; /* 0: 1 pixel for each 720 of the picture's height, and at least 1 */
+    bool has_background;
+    float background_top[3], background_bottom[3]; /* 0 to 1; without it a grey that light and dark
+                                                      points stand out from */
+} rend_look;
+
+#define REND_POINT_PX_MAX_DEFAULT 6.0f
+
+typedef struct {
+    uint64_t budget_points; /* points drawn in one frame; 0: all in a shot, REND_VIEW_BUDGET_DEFAULT
+                               in a window */
+    uint64_t ram_cache_bytes; /* 0: REND_RAM_CACHE_DEFAULT */
+    uint64_t gpu_cache_bytes; /* 0: REND_GPU_CACHE_DEFAULT */
+    float min_node_px;        /* minimum node size: nodes projecting to less are skipped; 0: see
+                                 render/select.h */
+} rend_limits;
+
+#define REND_VIEW_BUDGET_DEFAULT UINT64_C(3000000)
+#define REND_RAM_CACHE_DEFAULT (1024 * REND_MIB)
+#define REND_GPU_CACHE_DEFAULT (1024 * REND_MIB)

@@ -1,0 +1,99 @@
+/* render/select.h - which points to draw in a frame, and which nodes to fetch for the next ones.
+ *
+ * Wimmer & Scheiblauer 2006, section 5.3: the outer octree is walked by a priority queue, largest
+ * projected node first. For each node popped, in this order:
+ *
+ *   1. Would its points exceed the budget? Then the traversal stops.
+ *   2. Is it outside the view frustum? Then it is skipped, with all below it.
+ *   3. Is its lowest level too small? Then it is skipped, with all below it.
+ *   4. Is it resident? Then it is put on the draw list and its children on the queue. Else it is
+ *      requested and skipped.
+ *
+ * Step 3, as read here. A node's points refine those of its parent, whose finest cells are twice as
+ * wide as its own; where even those project to less than a pixel, the node adds nothing that shows.
+ * Said of the node's cube, that is a projected width of less than 2^(d-1) pixels: the minimum node
+ * size. The root is never skipped by it: it has no parent to stand for it.
+ *
+ * Projected sizes. The queue is ordered by the size at the node's centre, so that a node does not
+ * gain from one corner that touches the eye. Prefix and minimum node size are taken at its nearest
+ * visible point (min(r) of section 4.5).
+ *
+ * Splat sizes (end of section 5.3) follow the finest node drawn around a point, which need not be
+ * the one that the point is stored in: the points of the root stand everywhere between those of its
+ * descendants. The paper gives each node one size, that of its finest complete descendant; where
+ * density varies, that is too small here and too large there. So the selection tells for each
+ * octant of each node drawn what comes below it, and the vertex shader walks down to the size that
+ * holds at its place. An octant whose child is not drawn, be it missing or beyond the budget, has
+ * the size of the finest cells drawn of the node itself, so that a missing child leaves no gap. An
+ * octant without a child has the cells of the first level that holds most of the node's points,
+ * which is coarsely the sampling density.
+ *
+ * Pure: no GL, no file, no clock; no allocation once the workspace has grown to the size of the
+ * frame. */
+#pragma once
+#include "mospt/linear.h"
+#include "render/camera.h"
+
+typedef enum {
+    REND_ABSENT = 0,
+    REND_RESIDENT,
+    REND_DAMAGED, /* cannot be read: draws nothing, is not asked for again, and does not hide what
+                     is below it */
+} rend_residency;
+
+typedef struct {
+    const mospt_hierarchy *hierarchy;
+    const mospt_grid *grid;
+    const rend_frame *frame;
+    const uint8_t *residency; /* [hierarchy->count] rend_residency; NULL: everything is resident */
+    uint64_t budget_points;   /* 0: nothing; REND_ALL: no limit */
+    float min_node_px;        /* 0: 2^(d-1), see above */
+    float cell_px; /* a level is fine enough when its cells project to at most this; 0: 1 */
+    /* What is drawn and requested must fit the GPU cache together, or nodes would push each other
+     * out for ever: nodes that do not are as if beyond the budget. Counted in pages, as the cache
+     * does. */
+    uint64_t page_limit; /* 0: no limit */
+    uint32_t page_points;
+} rend_select_input;
+
+typedef struct {
+    uint32_t node;
+    uint32_t count;  /* leading points to draw */
+    uint32_t parent; /* index of the parent in the draw list; REND_NO_DRAW for the root */
+    float widest_px; /* widest cell of its octants where the node is nearest to the eye; infinite
+                        around it */
+} rend_draw;
+
+enum { REND_NO_DRAW = 0xffffffff };
+
+/* An octant of a drawn node: the index of the child in the draw list, or this bit and the log2 of
+ * the splat's width in steps. */
+#define REND_SPLAT UINT32_C(0x80000000)
+
+typedef struct {
+    uint32_t node;
+    float size_px; /* projected size: the larger, the more urgent */
+} rend_request;
+
+typedef struct {
+    rend_draw *draws;  /* [draw_count], largest first; parents stand before their children */
+    uint32_t *octants; /* [draw_count * 8], see REND_SPLAT */
+    uint32_t draw_count;
+    rend_request *requests; /* [request_count], most urgent first */
+    uint32_t request_count;
+    uint64_t points;                 /* sum of the counts of all draws */
+    uint64_t points_in_view;         /* of all nodes that passed steps 1 to 3, all their points */
+    uint32_t visited, culled, small; /* nodes popped; skipped in step 2; in step 3 */
+    bool stopped;                    /* in step 1: the budget is spent */
+} rend_selection;
+
+typedef struct rend_selector rend_selector; /* the workspace */
+
+/* NULL without memory. */
+rend_selector *rend_select_create(void);
+void rend_select_destroy(rend_selector *selector);
+
+/* Selects. The result belongs to the selector, and stays as it is until the next call.
+ * errors   MOSPT_ENOMEM */
+bool rend_select_run(rend_selector *selector, const rend_select_input *input,
+                     const rend_selection **out, mospt_err *err);

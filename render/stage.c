@@ -1,0 +1,555 @@
+#include "render/stage.h"
+
+#include "render/cache.h"
+#include "render/pages.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    PAGE_POINTS =
+        1024, /* 16 KiB: half a page is lost per node, 5 % of one that holds ten thousand points */
+    LOADER_THREADS = 2,
+    TAKE_MAX = 32,
+};
+/* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
+#define UPLOAD_BYTES_PER_FRAME (64 * REND_MIB)
+#define WAITING_BYTES_MAX (128 * REND_MIB)
+/* Points of neighbouring cells are up to two cells apart: splats this much wider than a cell leave
+ * few holes. */
+#define SPLAT_PER_CELL 1.25f
+/* Wider ones are discs: up to three pixels nobody tells the two apart, and a disc costs the early
+ * depth test. */
+#define SQUARE_PX_MAX 3.0f
+
+struct rend_stage {
+    const mospt_dataset *dataset;
+    rgl *gl;
+    rend_selector *selector;
+    rend_loader *loader;
+    rend_cache *ram; /* values: owned vertices */
+    rend_cache *gpu; /* values: owned rend_place; sizes: whole pages */
+    rend_pages *pages;
+    uint32_t page_count;
+    uint8_t *residency; /* [node count] on the GPU, owned */
+    uint32_t bounds_low[3], bounds_high[3], z_low, z_high;
+
+    const rend_selection *selection;
+    uint32_t *pinned; /* [pinned_count] nodes of the frame in hand, owned */
+    uint32_t pinned_count, pinned_capacity;
+    uint64_t *order; /* [order_capacity], owned: draws by splat size, see key_of() */
+    uint32_t order_capacity;
+    uint32_t *wanted;       /* [node count], owned: what to ask the loader for */
+    int32_t *first, *count; /* [range_capacity], owned */
+    uint32_t range_count, range_capacity;
+    rgl_batch batches[2]; /* squares, discs */
+    uint32_t batch_start[2], batch_count;
+
+    rend_frame frame;
+    rend_figures figures;
+};
+
+static void evict_vertices(void *user, uint32_t node, void *value)
+{
+    (void)user, (void)node;
+    free(value);
+}
+
+static void evict_place(void *user, uint32_t node, void *value)
+{
+    rend_stage *s = user;
+    rend_pages_release(s->pages, value);
+    free(value);
+    s->residency[node] = REND_ABSENT;
+}
+
+static uint32_t pages_of(const rend_stage *s, uint32_t node)
+{
+    return (uint32_t)(((uint64_t)s->dataset->hierarchy.nodes[node].count + PAGE_POINTS - 1) /
+                      PAGE_POINTS);
+}
+
+/* As many pages as the limit allows, as the dataset needs, and as the largest node needs at least.
+ */
+static uint32_t count_pages(const rend_stage *s, uint64_t limit_bytes)
+{
+    uint64_t all = 0, largest = 1, limit = limit_bytes / (PAGE_POINTS * sizeof(mospt_vertex));
+    for (uint32_t n = 0; n < s->dataset->hierarchy.count; n++) {
+        uint64_t pages = pages_of(s, n);
+        all += pages;
+        if (pages > largest) largest = pages;
+    }
+    if (limit > INT32_MAX / PAGE_POINTS) limit = INT32_MAX / PAGE_POINTS;
+    uint64_t count = all < limit ? all : limit;
+    return (uint32_t)(count > largest ? count : largest);
+}
+
+static uint64_t or_default(uint64_t value, uint64_t otherwise)
+{
+    return value > 0 ? value : otherwise;
+}
+
+static uint64_t largest_node(const mospt_dataset *dataset)
+{
+    uint64_t largest = 0;
+    for (uint32_t n = 0; n < dataset->hierarchy.count; n++)
+        if (dataset->hierarchy.nodes[n].count > largest)
+            largest = dataset->hierarchy.nodes[n].count;
+    return largest * sizeof(mospt_vertex);
+}
+
+static bool make_caches(rend_stage *s, const rend_limits *limits, rend_loader_wake *wake,
+                        void *user, mospt_err *err)
+{
+    uint32_t nodes = s->dataset->hierarchy.count;
+    uint64_t ram = or_default(limits->ram_cache_bytes, REND_RAM_CACHE_DEFAULT);
+    if (ram < largest_node(s->dataset)) ram = largest_node(s->dataset);
+    s->page_count = count_pages(s, or_default(limits->gpu_cache_bytes, REND_GPU_CACHE_DEFAULT));
+    uint64_t gpu = (uint64_t)s->page_count * PAGE_POINTS * sizeof(mospt_vertex);
+    s->residency = calloc((size_t)nodes + 1, 1);
+    s->wanted = calloc((size_t)nodes + 1, sizeof *s->wanted);
+    s->selector = rend_select_create();
+    s->pages = rend_pages_create(s->page_count);
+    s->ram = rend_cache_create(nodes, ram, evict_vertices, s);
+    s->gpu = rend_cache_create(nodes, gpu, evict_place, s);
+    if (s->residency == NULL || s->wanted == NULL || s->selector == NULL || s->pages == NULL ||
+        s->ram == NULL || s->gpu == NULL)
+        return mospt_err_nomem(err, (size_t)nodes * 64);
+    if (!rgl_arena_create(s->gl, (uint64_t)s->page_count * PAGE_POINTS, err)) return false;
+    uint64_t waiting = ram < WAITING_BYTES_MAX ? ram : WAITING_BYTES_MAX;
+    return rend_loader_create(s->dataset, LOADER_THREADS, waiting, wake, user, &s->loader, err);
+}
+
+bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits *limits,
+                       rend_loader_wake *wake, void *user, rend_stage **out, mospt_err *err)
+{
+    rend_stage *s = calloc(1, sizeof *s);
+    if (s == NULL) return mospt_err_nomem(err, sizeof *s);
+    s->dataset = dataset, s->gl = gl;
+    rend_frame_bounds(dataset, s->bounds_low, s->bounds_high);
+    rend_camera_heights(dataset, &s->z_low, &s->z_high);
+    if (!make_caches(s, limits, wake, user, err)) {
+        rend_stage_destroy(s);
+        return false;
+    }
+    *out = s;
+    return true;
+}
+
+void rend_stage_destroy(rend_stage *stage)
+{
+    if (stage == NULL) return;
+    rend_loader_destroy(stage->loader);
+    rend_cache_destroy(stage->ram);
+    rend_cache_destroy(stage->gpu);
+    rend_pages_destroy(stage->pages);
+    rend_select_destroy(stage->selector);
+    free(stage->residency);
+    free(stage->wanted);
+    free(stage->pinned);
+    free(stage->order);
+    free(stage->first);
+    free(stage->count);
+    free(stage);
+}
+
+/* ---- what is where ---- */
+
+static bool upload_runs(rend_stage *s, uint32_t node, const rend_place *place,
+                        const mospt_vertex *vertices, mospt_err *err)
+{
+    uint32_t count = s->dataset->hierarchy.nodes[node].count, done = 0;
+    for (uint32_t r = 0; r < place->run_count; r++) {
+        uint32_t part = place->runs[r].count * PAGE_POINTS;
+        if (part > count - done) part = count - done;
+        if (!rgl_arena_upload(s->gl, (uint64_t)place->runs[r].first * PAGE_POINTS, vertices + done,
+                              part, err))
+            return false;
+        done += part;
+    }
+    return true;
+}
+
+/* Puts a node on the GPU; false with `*full` if only pinned nodes could make room for it. */
+static bool upload(rend_stage *s, uint32_t node, const mospt_vertex *vertices, bool *full,
+                   mospt_err *err)
+{
+    uint64_t size = (uint64_t)pages_of(s, node) * PAGE_POINTS * sizeof *vertices;
+    *full = !rend_cache_reserve(s->gpu, size);
+    if (*full) return false;
+    rend_place *place = calloc(1, sizeof *place);
+    if (place == NULL) return mospt_err_nomem(err, sizeof *place);
+    if (!rend_pages_take(s->pages, pages_of(s, node), place, err)) return free(place), false;
+    if (!upload_runs(s, node, place, vertices, err)) {
+        rend_pages_release(s->pages, place);
+        return free(place), false;
+    }
+    bool put = rend_cache_put(s->gpu, node, size, place);
+    assert(put);
+    (void)put;
+    s->residency[node] = REND_RESIDENT;
+    return true;
+}
+
+/* A node that cannot be read is remembered, and named once. Too little memory is no damage: it may
+ * be there later. */
+static void note_damage(rend_stage *s, const rend_loaded *loaded)
+{
+    if (loaded->err.code == MOSPT_ENOMEM || s->residency[loaded->node] == REND_DAMAGED) return;
+    s->residency[loaded->node] = REND_DAMAGED;
+    s->figures.damaged_points += s->dataset->hierarchy.nodes[loaded->node].count;
+    if (s->figures.damaged_nodes++ == 0) s->figures.damage = loaded->err;
+}
+
+/* Takes over what the loader has read. What the RAM cache refuses is dropped: its pins are none, so
+ * that never happens to a node that fits, and every node fits. */
+static void store(rend_stage *s, const rend_loaded *loaded)
+{
+    if (loaded->vertices == NULL) {
+        note_damage(s, loaded);
+        return;
+    }
+    uint64_t size = mospt_dataset_vertices_size(s->dataset, loaded->node);
+    if (rend_cache_has(s->ram, loaded->node) ||
+        !rend_cache_put(s->ram, loaded->node, size, loaded->vertices))
+        free(loaded->vertices);
+}
+
+static bool pin(rend_stage *s, uint32_t node, mospt_err *err)
+{
+    if (s->pinned_count == s->pinned_capacity) {
+        uint32_t capacity = s->pinned_capacity > 0 ? 2 * s->pinned_capacity : 1024;
+        uint32_t *larger = realloc(s->pinned, capacity * sizeof *larger);
+        if (larger == NULL) return mospt_err_nomem(err, capacity * sizeof *larger);
+        s->pinned = larger, s->pinned_capacity = capacity;
+    }
+    rend_cache_use(s->gpu, node);
+    rend_cache_pin(s->gpu, node);
+    s->pinned[s->pinned_count++] = node;
+    return true;
+}
+
+static void unpin_all(rend_stage *s)
+{
+    while (s->pinned_count > 0)
+        rend_cache_unpin(s->gpu, s->pinned[--s->pinned_count]);
+}
+
+static bool put_on_gpu(rend_stage *s, uint32_t node, const mospt_vertex *vertices, mospt_err *err)
+{
+    bool full;
+    if (!upload(s, node, vertices, &full, err)) {
+        assert(!full); /* the caller asks for no more than fits */
+        return false;
+    }
+    return pin(s, node, err);
+}
+
+/* ---- what to draw in which order ---- */
+
+static float point_px_max(const rend_look *look)
+{
+    if (look->size_mode == REND_SIZE_FIXED) return fmaxf(look->point_px, 1);
+    return look->point_px_max > 0 ? fmaxf(look->point_px_max, 1) : REND_POINT_PX_MAX_DEFAULT;
+}
+
+static bool is_round(const rend_look *look, const rend_draw *d)
+{
+    float widest = look->size_mode == REND_SIZE_AUTO ? SPLAT_PER_CELL * d->widest_px : INFINITY;
+    return fminf(widest, point_px_max(look)) > SQUARE_PX_MAX;
+}
+
+/* Squares before discs, and then the order of the selection. This order, not the one in which nodes
+ * were read, decides which of two points at the same depth is seen. */
+static uint64_t key_of(const rend_look *look, const rend_draw *d, uint32_t index)
+{
+    return (uint64_t)is_round(look, d) << 32 | index;
+}
+
+static int compare_keys(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+static bool sort_draws(rend_stage *s, const rend_view_of *view, mospt_err *err)
+{
+    uint32_t count = s->selection->draw_count;
+    if (count > s->order_capacity) {
+        uint64_t *larger = realloc(s->order, count * sizeof *larger);
+        if (larger == NULL) return mospt_err_nomem(err, count * sizeof *larger);
+        s->order = larger, s->order_capacity = count;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        s->order[i] = key_of(&view->look, &s->selection->draws[i], i);
+    if (count > 0) qsort(s->order, count, sizeof *s->order, compare_keys);
+    return true;
+}
+
+static const rend_draw *draw_at(const rend_stage *s, uint32_t place_in_order)
+{
+    return &s->selection->draws[s->order[place_in_order] & UINT32_MAX];
+}
+
+static bool add_range(rend_stage *s, uint32_t first, uint32_t count, bool join, mospt_err *err)
+{
+    if (join && s->first[s->range_count - 1] + s->count[s->range_count - 1] == (int32_t)first) {
+        s->count[s->range_count - 1] += (int32_t)count;
+        return true;
+    }
+    if (s->range_count == s->range_capacity) {
+        uint32_t capacity = s->range_capacity > 0 ? 2 * s->range_capacity : 1024;
+        int32_t *f = realloc(s->first, capacity * sizeof *f);
+        if (f != NULL) s->first = f;
+        int32_t *c = realloc(s->count, capacity * sizeof *c);
+        if (c != NULL) s->count = c;
+        if (f == NULL || c == NULL) return mospt_err_nomem(err, capacity * sizeof *f);
+        s->range_capacity = capacity;
+    }
+    s->first[s->range_count] = (int32_t)first;
+    s->count[s->range_count++] = (int32_t)count;
+    return true;
+}
+
+/* The leading points of a node, through the runs of pages that hold them. */
+static bool add_node(rend_stage *s, const rend_draw *d, mospt_err *err)
+{
+    const rend_place *place = rend_cache_use(s->gpu, d->node);
+    uint32_t left = d->count;
+    for (uint32_t r = 0; place != NULL && left > 0 && r < place->run_count; r++) {
+        uint32_t part = place->runs[r].count * PAGE_POINTS;
+        if (part > left) part = left;
+        bool join = s->range_count > s->batch_start[s->batch_count - 1];
+        if (!add_range(s, place->runs[r].first * PAGE_POINTS, part, join, err)) return false;
+        left -= part;
+    }
+    return true;
+}
+
+/* Batches of the draws from .. to - 1 of the order that are on the GPU. */
+static bool make_batches(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
+{
+    s->range_count = s->batch_count = 0;
+    for (uint32_t i = from; i < to; i++) {
+        const rend_draw *d = draw_at(s, i);
+        bool round = s->order[i] >> 32 != 0;
+        if (s->batch_count == 0 || s->batches[s->batch_count - 1].round != round) {
+            s->batch_start[s->batch_count] = s->range_count;
+            s->batches[s->batch_count++] = (rgl_batch){.round = round};
+        }
+        if (s->residency[d->node] != REND_RESIDENT) continue;
+        if (!add_node(s, d, err)) return false;
+        s->figures.points_drawn += d->count;
+        s->figures.nodes_drawn++;
+    }
+    for (uint32_t b = 0; b < s->batch_count; b++) {
+        uint32_t end = b + 1 < s->batch_count ? s->batch_start[b + 1] : s->range_count;
+        s->batches[b].first = s->first + s->batch_start[b];
+        s->batches[b].count = s->count + s->batch_start[b];
+        s->batches[b].range_count = end - s->batch_start[b];
+    }
+    return true;
+}
+
+static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
+{
+    /* A grey that whitewash and shadow both stand out from, a little lighter where the sky is. */
+    static const float top[3] = {0.36f, 0.39f, 0.43f}, bottom[3] = {0.20f, 0.21f, 0.23f};
+    const rend_look *look = &view->look;
+    rgl_scene scene = {
+        .frame = s->frame,
+        .colour = look->colour,
+        .z_low = s->z_low,
+        .z_high = s->z_high,
+        .octants = look->size_mode == REND_SIZE_AUTO ? s->selection->octants : NULL,
+        .octant_nodes = s->selection->draw_count,
+        .grid_bits = s->dataset->metadata.grid.bits,
+        .splat_scale = SPLAT_PER_CELL,
+        .splat_size = look->size_mode == REND_SIZE_WORLD
+                          ? (float)(look->point_m / s->dataset->metadata.grid.step)
+                          : 0,
+        .px_min = look->size_mode == REND_SIZE_FIXED ? point_px_max(look) : 1,
+        .px_max = point_px_max(look),
+        .edl_strength = look->no_edl ? 0 : (look->edl_strength > 0 ? look->edl_strength : 1) * 24,
+        .edl_radius_px =
+            look->edl_radius_px > 0 ? look->edl_radius_px : fmaxf(1, (float)view->height / 720),
+    };
+    for (int c = 0; c < 3; c++) {
+        scene.background_top[c] = look->has_background ? look->background_top[c] : top[c];
+        scene.background_bottom[c] = look->has_background ? look->background_bottom[c] : bottom[c];
+    }
+    return scene;
+}
+
+static bool select_view(rend_stage *s, const rend_view_of *view, bool everything, mospt_err *err)
+{
+    rend_frame_make(&view->camera, &s->dataset->metadata.grid, s->bounds_low, s->bounds_high,
+                    view->width, view->height, &s->frame);
+    rend_select_input input = {
+        .hierarchy = &s->dataset->hierarchy,
+        .grid = &s->dataset->metadata.grid,
+        .frame = &s->frame,
+        .residency = everything ? NULL : s->residency,
+        .budget_points = view->budget_points,
+        .min_node_px = view->min_node_px,
+        .page_limit = everything ? 0 : s->page_count,
+        .page_points = PAGE_POINTS,
+    };
+    if (!rend_select_run(s->selector, &input, &s->selection, err)) return false;
+    s->figures.points_drawn = 0;
+    s->figures.nodes_drawn = 0;
+    s->figures.points_in_view = s->selection->points_in_view;
+    s->figures.nodes_visited = s->selection->visited;
+    s->figures.budget_spent = s->selection->stopped;
+    return sort_draws(s, view, err);
+}
+
+/* ---- a frame in a window ---- */
+
+static void take_loaded(rend_stage *s)
+{
+    rend_loaded loaded[TAKE_MAX];
+    for (uint32_t count; (count = rend_loader_take(s->loader, loaded, TAKE_MAX)) > 0;)
+        for (uint32_t i = 0; i < count; i++)
+            store(s, &loaded[i]);
+}
+
+/* Uploads what the RAM cache has, and asks the loader for the rest. */
+static bool fetch(rend_stage *s, rend_progress *progress, mospt_err *err)
+{
+    uint64_t bytes = 0;
+    uint32_t wanted = 0;
+    *progress = REND_SETTLED;
+    for (uint32_t i = 0; i < s->selection->request_count; i++) {
+        uint32_t node = s->selection->requests[i].node;
+        const mospt_vertex *vertices = rend_cache_use(s->ram, node);
+        if (vertices == NULL) {
+            s->wanted[wanted++] = node;
+            continue;
+        }
+        *progress = REND_AGAIN;
+        if (bytes >= UPLOAD_BYTES_PER_FRAME) break;
+        /* The selection asks for no more than fits, and what was just put there must not make room
+         * for what comes next. */
+        if (!put_on_gpu(s, node, vertices, err)) return false;
+        bytes += mospt_dataset_vertices_size(s->dataset, node);
+    }
+    if (*progress == REND_SETTLED && wanted > 0) *progress = REND_WAITING;
+    s->figures.pending = s->selection->request_count;
+    return rend_loader_request(s->loader, s->wanted, wanted, err);
+}
+
+bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
+                      mospt_err *err)
+{
+    take_loaded(stage);
+    if (!select_view(stage, view, false, err)) return false;
+    unpin_all(stage);
+    for (uint32_t i = 0; i < stage->selection->draw_count; i++)
+        if (!pin(stage, stage->selection->draws[i].node, err)) return false;
+    if (!make_batches(stage, 0, stage->selection->draw_count, err)) return false;
+    rgl_scene scene = make_scene(stage, view);
+    if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count,
+                  RGL_BEGIN | RGL_END | view->parts, err))
+        return false;
+    return fetch(stage, progress, err);
+}
+
+/* ---- a picture ---- */
+
+/* How far the order goes until the GPU cache is full. */
+static uint32_t end_of_chunk(const rend_stage *s, uint32_t from)
+{
+    uint64_t pages = 0;
+    uint32_t to = from;
+    for (; to < s->selection->draw_count; to++) {
+        pages += pages_of(s, draw_at(s, to)->node);
+        if (pages > s->page_count && to > from) break;
+    }
+    return to;
+}
+
+/* Uploads what has been read before it goes to the RAM cache: a small one would evict it at once.
+ */
+static bool receive(rend_stage *s, const rend_loaded *loaded, mospt_err *err)
+{
+    if (loaded->vertices == NULL && loaded->err.code == MOSPT_ENOMEM) {
+        if (err != NULL) *err = loaded->err;
+        return false;
+    }
+    bool ok = loaded->vertices == NULL || s->residency[loaded->node] == REND_RESIDENT ||
+              put_on_gpu(s, loaded->node, loaded->vertices, err);
+    store(s, loaded);
+    return ok;
+}
+
+static bool wait_for(rend_stage *s, uint32_t count, mospt_err *err)
+{
+    while (count > 0) {
+        rend_loaded loaded;
+        if (!rend_loader_wait(s->loader)) return mospt_err_nomem(err, 0);
+        if (rend_loader_take(s->loader, &loaded, 1) == 0) continue;
+        /* Something asked for by an earlier frame is welcome, but not waited for. */
+        for (uint32_t i = 0; i < count; i++)
+            if (s->wanted[i] == loaded.node) {
+                s->wanted[i] = s->wanted[--count];
+                break;
+            }
+        if (!receive(s, &loaded, err)) return false;
+    }
+    return true;
+}
+
+/* Brings the nodes from .. to - 1 of the order to the GPU and keeps them there. */
+static bool bring(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
+{
+    uint32_t wanted = 0;
+    unpin_all(s);
+    for (uint32_t i = from; i < to; i++) {
+        uint32_t node = draw_at(s, i)->node;
+        if (s->residency[node] == REND_RESIDENT && !pin(s, node, err)) return false;
+    }
+    for (uint32_t i = from; i < to; i++) {
+        uint32_t node = draw_at(s, i)->node;
+        if (s->residency[node] != REND_ABSENT) continue;
+        const mospt_vertex *vertices = rend_cache_use(s->ram, node);
+        if (vertices == NULL) s->wanted[wanted++] = node;
+        else if (!put_on_gpu(s, node, vertices, err)) return false;
+    }
+    return rend_loader_request(s->loader, s->wanted, wanted, err) && wait_for(s, wanted, err);
+}
+
+bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
+{
+    if (!select_view(stage, view, true, err)) return false;
+    rgl_scene scene = make_scene(stage, view);
+    uint32_t total = stage->selection->draw_count, from = 0;
+    int parts = RGL_BEGIN | view->parts;
+    do {
+        uint32_t to = end_of_chunk(stage, from);
+        if (!bring(stage, from, to, err) || !make_batches(stage, from, to, err)) return false;
+        if (to == total) parts |= RGL_END;
+        if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count, parts, err))
+            return false;
+        parts &= ~RGL_BEGIN;
+        from = to;
+    } while (from < total);
+    unpin_all(stage);
+    stage->figures.pending = 0;
+    return true;
+}
+
+void rend_stage_figures(rend_stage *stage, rend_figures *out)
+{
+    rend_figures *f = &stage->figures;
+    f->ram_used = rend_cache_used(stage->ram), f->ram_limit = rend_cache_limit(stage->ram);
+    f->gpu_used = rend_cache_used(stage->gpu), f->gpu_limit = rend_cache_limit(stage->gpu);
+    f->loaded_bytes = rend_loader_bytes(stage->loader);
+    *out = *f;
+}
+
+const rend_frame *rend_stage_last_frame(const rend_stage *stage)
+{
+    return &stage->frame;
+}

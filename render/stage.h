@@ -1,0 +1,66 @@
+/* render/stage.h - one frame: select, fetch, upload, draw.
+ *
+ * Owns the caches, the loader and the selection of one dataset on one GL context. In a window a
+ * frame takes what is resident and asks for the rest (rend_stage_frame); a picture waits for all of
+ * it and is the same, byte for byte, however small the caches are (rend_stage_still). Neither knows
+ * a clock.
+ * threads  the one that has the context */
+#pragma once
+#include "mospt/dataset.h"
+#include "render/camera.h"
+#include "render/gl/rgl.h"
+#include "render/loader.h"
+#include "render/options.h"
+#include "render/select.h"
+
+typedef struct rend_stage rend_stage;
+
+typedef struct {
+    rend_camera camera;
+    uint32_t width, height; /* pixels */
+    rend_look look;
+    uint64_t budget_points; /* REND_ALL: no limit */
+    float min_node_px;      /* 0: see render/select.h */
+    int parts;              /* RGL_TO_WINDOW or 0 */
+} rend_view_of;
+
+typedef struct {
+    uint64_t points_drawn, points_in_view; /* in view: all points of the nodes that a higher budget
+                                              would not reject first */
+    uint32_t nodes_drawn, nodes_visited;
+    bool budget_spent;
+    uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
+    uint64_t loaded_bytes;                             /* since the start */
+    uint32_t pending;                                  /* nodes that this view still misses */
+    uint32_t damaged_nodes;
+    uint64_t damaged_points;
+    mospt_err damage; /* of the first damaged node; code MOSPT_OK without any */
+} rend_figures;
+
+/* dataset  borrowed
+ * gl       borrowed
+ * limits   cache sizes; smaller than the largest node, they are raised to that
+ * wake     from a loader thread, when a frame would now show more; NULL: nobody needs to know
+ * errors   MOSPT_ENOMEM, MOSPT_EIO */
+bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits *limits,
+                       rend_loader_wake *wake, void *user, rend_stage **out, mospt_err *err);
+void rend_stage_destroy(rend_stage *stage);
+
+typedef enum {
+    REND_SETTLED, /* the same view again would draw the same picture, and nothing more is to come */
+    REND_WAITING, /* as long as the loader does not wake anybody, too */
+    REND_AGAIN,   /* the next frame shows more */
+} rend_progress;
+
+/* Draws what is resident and asks for what is not. Uploads at most a fixed number of bytes; never
+ * waits. */
+bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
+                      mospt_err *err);
+
+/* Draws all that the budget allows, reading it through the caches in as many parts as they need. */
+bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err);
+
+void rend_stage_figures(rend_stage *stage, rend_figures *out);
+
+/* The frame that was drawn last: to find out what is under the cursor. */
+const rend_frame *rend_stage_last_frame(const rend_stage *stage);

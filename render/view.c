@@ -1,0 +1,429 @@
+#include "render/view.h"
+
+#include "render/gl/text.h"
+#include "render/gl/window.h"
+#include "render/hud.h"
+#include "render/image.h"
+#include "render/orbit.h"
+#include "render/stage.h"
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
+#define BUDGET_MIN UINT64_C(10000)
+#define MOVING_FRAME_MS 66.0
+#define MOVING_BUDGET_MIN 200000.0
+#define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
+#define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
+#define FLY_FASTER 4
+#define ZOOM_PER_STEP 0.85
+#define TURN_RAD_PER_PX 0.006 /* at 720 lines: half a turn for three quarters of the height */
+
+typedef struct {
+    const mospt_dataset *dataset;
+    const rend_view_options *options;
+    rgl_window *window;
+    rgl *gl;
+    rgl_text *text; /* NULL: no font */
+    float text_scale;
+    rend_stage *stage;
+    rend_view_of view;
+    rend_camera home;
+    bool help, quit, dirty;
+
+    /* A drag in hand. */
+    enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN } drag;
+    double cursor[2], pivot[3], grip_w; /* metres */
+
+    atomic_bool loaded; /* set by the loader's threads: the next frame shows more */
+    rend_progress progress;
+    double flown_at;      /* seconds; 0: not flying */
+    double moved_at;      /* seconds; 0: the last frame was drawn at rest */
+    double points_per_ms; /* of the frames so far; 0: not known */
+    double frame_ms, notice_until;
+    char notice[1200];
+    rend_view_result result;
+} viewer;
+
+static void on_loaded(void *user)
+{
+    viewer *v = user;
+    atomic_store(&v->loaded, true);
+    rgl_window_wake(v->window);
+}
+
+static void tell(viewer *v, const char *what)
+{
+    snprintf(v->notice, sizeof v->notice, "%s", what);
+    v->notice_until = rgl_window_seconds() + NOTICE_S;
+    v->dirty = true;
+}
+
+/* ---- where things are ---- */
+
+/* Distance along the view axis, metres, of the nearest point around the cursor; that of the target
+ * over empty space. */
+static double distance_at(viewer *v, double x, double y, bool *hit)
+{
+    float depths[(2 * PICK_RADIUS_PX + 1) * (2 * PICK_RADIUS_PX + 1)], nearest = 1;
+    if (rgl_read_depth(v->gl, (int)x, (int)y, PICK_RADIUS_PX, depths, NULL))
+        for (size_t i = 0; i < sizeof depths / sizeof *depths; i++)
+            nearest = fminf(nearest, depths[i]);
+    *hit = nearest < 1;
+    if (!*hit) return rend_orbit_distance(&v->view.camera);
+    return (double)rend_frame_depth_to_w(rend_stage_last_frame(v->stage), nearest) *
+           v->dataset->metadata.grid.step;
+}
+
+static bool point_at(viewer *v, double x, double y, double out[3])
+{
+    bool hit;
+    double w = distance_at(v, x, y, &hit);
+    rend_orbit_unproject(&v->view.camera, x, y, w, v->view.width, v->view.height, out);
+    return hit;
+}
+
+/* ---- hands ---- */
+
+static void touch_camera(viewer *v)
+{
+    v->moved_at = rgl_window_seconds();
+    v->dirty = true;
+}
+
+static void start_drag(viewer *v, const rgl_event *e)
+{
+    bool hit;
+    v->drag = e->button == RGL_BUTTON_LEFT && !e->shift ? DRAG_ORBIT : DRAG_PAN;
+    v->grip_w = distance_at(v, e->x, e->y, &hit);
+    if (!point_at(v, e->x, e->y, v->pivot))
+        memcpy(v->pivot, v->view.camera.target, sizeof v->pivot);
+}
+
+static void move_cursor(viewer *v, const rgl_event *e)
+{
+    double dx = e->x - v->cursor[0], dy = e->y - v->cursor[1];
+    double turn = TURN_RAD_PER_PX * 720 / v->view.height;
+    if (v->drag == DRAG_ORBIT) rend_orbit_turn(&v->view.camera, v->pivot, dx * turn, dy * turn);
+    if (v->drag == DRAG_PAN) rend_orbit_pan(&v->view.camera, dx, dy, v->grip_w, v->view.height);
+    if (v->drag != DRAG_NONE) touch_camera(v);
+    v->cursor[0] = e->x, v->cursor[1] = e->y;
+}
+
+static double nearest_distance(const viewer *v)
+{
+    return 16 * v->dataset->metadata.grid.step;
+}
+
+static void scroll(viewer *v, const rgl_event *e)
+{
+    double towards[3];
+    point_at(v, e->x, e->y, towards);
+    rend_orbit_zoom(&v->view.camera, towards, pow(ZOOM_PER_STEP, e->dy), nearest_distance(v));
+    touch_camera(v);
+}
+
+static void scale_budget(viewer *v, double factor)
+{
+    uint64_t total = v->dataset->metadata.point_count;
+    double budget =
+        v->view.budget_points == REND_ALL ? (double)total : (double)v->view.budget_points;
+    budget = fmax(budget * factor, (double)BUDGET_MIN);
+    v->view.budget_points = budget >= (double)total && factor > 1 ? REND_ALL : (uint64_t)budget;
+}
+
+static void scale_points(viewer *v, float step)
+{
+    rend_look *look = &v->view.look;
+    float now = look->size_mode == REND_SIZE_FIXED ? fmaxf(look->point_px, 1) : 1;
+    if (look->size_mode == REND_SIZE_FIXED || step > 0) now += step;
+    look->size_mode = REND_SIZE_FIXED;
+    look->point_px = fminf(fmaxf(now, 1), 32);
+}
+
+static void save_picture(viewer *v)
+{
+    char name[64], text[1100];
+    time_t now = time(NULL);
+    struct tm local;
+    mospt_err err = {0};
+    size_t size = (size_t)v->view.width * v->view.height * 3;
+    uint8_t *rgb = malloc(size);
+    rend_view_of still = v->view;
+    rend_progress ignored;
+    still.parts = 0;
+    localtime_r(&now, &local);
+    strftime(name, sizeof name, "instantpoints-%Y%m%d-%H%M%S.png", &local);
+    bool ok = rgb != NULL || mospt_err_nomem(&err, size);
+    ok = ok && rend_stage_frame(v->stage, &still, &ignored, &err) &&
+         rgl_read_pixels(v->gl, false, still.width, still.height, rgb, &err) &&
+         rend_image_write(name, rgb, still.width, still.height, &err);
+    free(rgb);
+    if (ok) snprintf(text, sizeof text, "saved %s", name);
+    else mospt_err_text(&err, text, sizeof text);
+    tell(v, text);
+}
+
+/* Keys that change how points look. */
+static void press_look_key(viewer *v, int key)
+{
+    rend_look *look = &v->view.look;
+    if (key == '+') scale_points(v, 1);
+    else if (key == '-') scale_points(v, -1);
+    else if (key == '0') look->size_mode = REND_SIZE_AUTO;
+    else if (key == 'C') look->colour = (rend_colour)((look->colour + 1) % REND_COLOUR_COUNT);
+    else if (key >= '1' && key <= '3') look->colour = (rend_colour)(key - '1');
+    else if (key == 'L') look->no_edl = !look->no_edl;
+}
+
+static void press_key(viewer *v, const rgl_event *e)
+{
+    v->dirty = true;
+    if (e->key == RGL_KEY_ESCAPE || (e->key == 'W' && e->control)) v->quit = true;
+    else if (e->key == 'H' || e->key == RGL_KEY_F1 || e->key == '?') v->help = !v->help;
+    else if (e->key == 'R') v->view.camera = v->home;
+    else if (e->key == 'B') scale_budget(v, e->shift ? 0.5 : 2);
+    else if (e->key == ']') scale_budget(v, 1.25);
+    else if (e->key == '[') scale_budget(v, 0.8);
+    else if (e->key == 'P') save_picture(v);
+    else if (e->key == 'F') rgl_window_toggle_fullscreen(v->window);
+    else press_look_key(v, e->key);
+}
+
+static void handle(viewer *v, const rgl_event *e)
+{
+    switch (e->kind) {
+    case RGL_EVENT_KEY:
+        press_key(v, e);
+        break;
+    case RGL_EVENT_BUTTON:
+        v->cursor[0] = e->x, v->cursor[1] = e->y;
+        if (e->down) start_drag(v, e);
+        else v->drag = DRAG_NONE;
+        break;
+    case RGL_EVENT_MOVE:
+        move_cursor(v, e);
+        break;
+    case RGL_EVENT_SCROLL:
+        scroll(v, e);
+        break;
+    case RGL_EVENT_REFRESH:
+        v->dirty = true;
+        break;
+    case RGL_EVENT_CLOSE:
+        v->quit = true;
+        break;
+    }
+}
+
+static int is_held(const rgl_window *window, int key, int other)
+{
+    return rgl_window_is_down(window, key) || rgl_window_is_down(window, other);
+}
+
+/* Keys that are held. Speed follows the distance to the target, which flies along. */
+static bool fly(viewer *v)
+{
+    const rgl_window *w = v->window;
+    double by[3] = {is_held(w, 'D', RGL_KEY_RIGHT) - is_held(w, 'A', RGL_KEY_LEFT),
+                    is_held(w, 'E', 0) - is_held(w, 'Q', 0),
+                    is_held(w, 'W', RGL_KEY_UP) - is_held(w, 'S', RGL_KEY_DOWN)};
+    double now = rgl_window_seconds(),
+           elapsed = v->flown_at > 0 ? fmin(now - v->flown_at, 0.25) : 0.016;
+    if (by[0] == 0 && by[1] == 0 && by[2] == 0) {
+        v->flown_at = 0;
+        return false;
+    }
+    double speed =
+        FLY_DISTANCES_PER_S * fmax(rend_orbit_distance(&v->view.camera), nearest_distance(v));
+    if (rgl_window_is_down(w, RGL_KEY_SHIFT)) speed *= FLY_FASTER;
+    for (int a = 0; a < 3; a++)
+        by[a] *= speed * elapsed;
+    rend_orbit_fly(&v->view.camera, by);
+    v->flown_at = now;
+    touch_camera(v);
+    return true;
+}
+
+/* ---- frames ---- */
+
+/* A font once it is known how large; a window without words is better than none. */
+static void fit_text(viewer *v)
+{
+    float scale = rgl_window_scale(v->window);
+    mospt_err err = {0};
+    if (v->text_scale == scale) return;
+    v->text_scale = scale;
+    rgl_text_destroy(v->text);
+    v->text = NULL;
+    if (!rgl_text_create(TEXT_PX * scale, &v->text, &err)) v->result.no_words = err;
+}
+
+static bool draw_words(viewer *v, mospt_err *err)
+{
+    static const char *const colours[] = {"RGB", "intensity", "elevation"};
+    char look[64];
+    const rend_look *l = &v->view.look;
+    rend_hud hud = {.frame_ms = v->frame_ms,
+                    .budget_points = v->view.budget_points,
+                    .notice = v->notice,
+                    .help = v->help};
+    if (v->text == NULL) return true;
+    if (l->size_mode == REND_SIZE_FIXED)
+        snprintf(look, sizeof look, "%s  %g px", colours[l->colour], (double)fmaxf(l->point_px, 1));
+    else snprintf(look, sizeof look, "%s", colours[l->colour]);
+    hud.look = look;
+    rend_stage_figures(v->stage, &hud.figures);
+    return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err);
+}
+
+/* What can be drawn in time while the camera moves. */
+static uint64_t moving_budget(const viewer *v)
+{
+    double budget = fmax(v->points_per_ms * MOVING_FRAME_MS, MOVING_BUDGET_MIN);
+    bool all = v->moved_at == 0 || v->points_per_ms == 0 || budget >= (double)v->view.budget_points;
+    return all ? v->view.budget_points : (uint64_t)budget;
+}
+
+/* Small frames say more about everything else than about points. */
+static void measure(viewer *v)
+{
+    rend_figures figures;
+    rend_stage_figures(v->stage, &figures);
+    if ((double)figures.points_drawn < MOVING_BUDGET_MIN / 2) return;
+    double now = (double)figures.points_drawn / fmax(v->frame_ms, 0.1);
+    v->points_per_ms = v->points_per_ms > 0 ? 0.7 * v->points_per_ms + 0.3 * now : now;
+}
+
+static bool write_screenshot(viewer *v, mospt_err *err)
+{
+    size_t size = (size_t)v->view.width * v->view.height * 3;
+    uint8_t *rgb = malloc(size);
+    bool ok = rgb != NULL || mospt_err_nomem(err, size);
+    ok = ok && rgl_read_pixels(v->gl, true, v->view.width, v->view.height, rgb, err) &&
+         rend_image_write(v->options->screenshot, rgb, v->view.width, v->view.height, err);
+    free(rgb);
+    return ok;
+}
+
+static bool is_last(const viewer *v)
+{
+    return v->quit || (v->options->frames > 0 && v->result.frames + 1 >= v->options->frames);
+}
+
+static bool frame(viewer *v, mospt_err *err)
+{
+    uint32_t width, height;
+    double start = rgl_window_seconds();
+    atomic_store(&v->loaded, false);
+    v->dirty = false;
+    rgl_window_size(v->window, &width, &height);
+    if (width == 0 || height == 0) { /* iconified; a refresh tells when it is back */
+        v->progress = REND_WAITING;
+        return true;
+    }
+    v->view.width = width, v->view.height = height;
+    fit_text(v);
+    rend_view_of view = v->view;
+    view.budget_points = moving_budget(v);
+    if (!rend_stage_frame(v->stage, &view, &v->progress, err) || !draw_words(v, err)) return false;
+    if (is_last(v) && v->options->screenshot != NULL && !write_screenshot(v, err)) return false;
+    rgl_window_show(v->window);
+    v->frame_ms = (rgl_window_seconds() - start) * 1e3;
+    measure(v);
+    v->result.mean_ms += v->frame_ms; /* the sum as yet */
+    v->result.slowest_ms = fmax(v->result.slowest_ms, v->frame_ms);
+    v->result.frames++;
+    return true;
+}
+
+static bool is_due(const viewer *v)
+{
+    return v->dirty || v->progress == REND_AGAIN || atomic_load(&v->loaded) ||
+           v->options->frames > 0;
+}
+
+/* How long nothing needs to be drawn, unless something happens: seconds, 0 not at all, below 0 for
+ * ever. */
+static double rest(const viewer *v)
+{
+    if (is_due(v)) return 0;
+    if (v->moved_at > 0) return fmax(v->moved_at + MOVING_S - rgl_window_seconds(), 0.001);
+    return v->notice[0] != '\0' ? fmax(v->notice_until - rgl_window_seconds(), 0.01) : -1;
+}
+
+/* After a movement one more frame is owed, with the whole budget. */
+static void come_to_rest(viewer *v)
+{
+    bool held = v->drag != DRAG_NONE && rgl_window_seconds() < v->moved_at + 3 * MOVING_S;
+    if (v->moved_at == 0 || held || rgl_window_seconds() < v->moved_at + MOVING_S) return;
+    v->moved_at = 0;
+    v->dirty = true;
+}
+
+static bool run(viewer *v, mospt_err *err)
+{
+    while (!v->quit) {
+        rgl_event event;
+        rgl_window_wait(v->window, rest(v));
+        while (rgl_window_next(v->window, &event))
+            handle(v, &event);
+        fly(v);
+        come_to_rest(v);
+        if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
+            v->notice[0] = '\0', v->dirty = true;
+        if (is_due(v) && !frame(v, err)) return false;
+        if (v->options->frames > 0 && v->result.frames >= v->options->frames) v->quit = true;
+    }
+    /* The user has quit: the picture that was asked for is still owed. */
+    bool owed = v->options->screenshot != NULL &&
+                (v->options->frames == 0 || v->result.frames < v->options->frames);
+    return !owed || frame(v, err);
+}
+
+static bool open_viewer(viewer *v, mospt_err *err)
+{
+    const rend_view_options *o = v->options;
+    v->view.look = o->look;
+    v->view.budget_points =
+        o->limits.budget_points > 0 ? o->limits.budget_points : REND_VIEW_BUDGET_DEFAULT;
+    v->view.min_node_px = o->limits.min_node_px;
+    v->view.parts = RGL_TO_WINDOW;
+    v->view.width = o->width > 0 ? o->width : REND_WIDTH_DEFAULT;
+    v->view.height = o->height > 0 ? o->height : REND_HEIGHT_DEFAULT;
+    v->help = o->help;
+    v->dirty = true;
+    if (!rend_camera_make(&o->camera, v->dataset, v->view.width, v->view.height, &v->home, err))
+        return false;
+    v->view.camera = v->home;
+    return rgl_window_create(o->title != NULL ? o->title : v->dataset->path, v->view.width,
+                             v->view.height, &v->window, err) &&
+           rgl_gl_create(&v->gl, err) &&
+           rend_stage_create(v->dataset, v->gl, &o->limits, on_loaded, v, &v->stage, err);
+}
+
+bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
+               rend_view_result *result, mospt_err *err)
+{
+    viewer v = {.dataset = dataset, .options = options};
+    bool ok = open_viewer(&v, err) && run(&v, err);
+    if (ok) {
+        rend_figures figures;
+        rend_stage_figures(v.stage, &figures);
+        v.result.damaged_nodes = figures.damaged_nodes;
+        v.result.damaged_points = figures.damaged_points;
+        v.result.damage = figures.damage;
+        if (v.result.frames > 0) v.result.mean_ms /= (double)v.result.frames;
+        if (result != NULL) *result = v.result;
+    }
+    rgl_text_destroy(v.text);
+    rend_stage_destroy(v.stage);
+    rgl_destroy(v.gl);
+    rgl_window_destroy(v.window);
+    return ok;
+}

@@ -1,0 +1,33 @@
+/* render/view.h - the window: a dataset to walk through. */
+#pragma once
+#include "mospt/dataset.h"
+#include "render/options.h"
+
+typedef struct {
+    const char *title;      /* NULL: the dataset's path */
+    uint32_t width, height; /* of the window; 0: 1280 x 720 */
+    rend_camera_options camera;
+    rend_look look;
+    rend_limits limits; /* budget_points 0: REND_VIEW_BUDGET_DEFAULT; REND_ALL: no limit */
+    uint64_t frames; /* quit after so many frames, for scripts and tests; 0: when the user does */
+    const char *screenshot; /* of the window, words and all, written before it closes; NULL: none */
+    bool help;              /* with the help shown */
+} rend_view_options;
+
+typedef struct {
+    uint64_t frames;
+    double slowest_ms, mean_ms;
+    uint32_t damaged_nodes;
+    uint64_t damaged_points;
+    mospt_err damage;   /* of the first of them */
+    mospt_err no_words; /* why there were no words over the picture; code MOSPT_OK: there were */
+} rend_view_result;
+
+/* Shows the dataset until the user has seen enough. While the camera moves, a machine that cannot
+ * draw the budget fifteen times a second draws as much of it as it can; all of it appears as soon
+ * as the camera rests. When nothing changes and nothing is loading, nothing is drawn.
+ * result   NULL: not wanted
+ * errors   MOSPT_EINVAL (options; no display), MOSPT_EIO (the driver was lost), MOSPT_ENOMEM
+ * threads  the main one */
+bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
+               rend_view_result *result, mospt_err *err);

@@ -1,0 +1,24 @@
+# Tests of mospt/, preprocess/ (without the readers) and the program, in C with cmocka.
+if(NOT TARGET PkgConfig::CMOCKA)
+    pkg_check_modules(CMOCKA REQUIRED IMPORTED_TARGET cmocka)
+endif()
+
+add_library(core_tools STATIC core_tools.c ref_mospt.c ref_tree.c core_scans.c)
+target_link_libraries(core_tools PUBLIC flags mospt prep PkgConfig::CMOCKA)
+
+foreach(name
+        err schema grid hierarchy linear payload metadata dataset
+        sort spool workers plan solve pass build)
+    add_executable(test_${name} test_${name}.c)
+    target_link_libraries(test_${name} PRIVATE core_tools)
+    add_test(NAME ${name} COMMAND test_${name})
+    set_tests_properties(${name} PROPERTIES LABELS core TIMEOUT 300)
+endforeach()
+
+# The program itself. It is told where it is.
+if(TARGET instantpoints)
+    add_executable(e2e_cli e2e_cli.c)
+    target_link_libraries(e2e_cli PRIVATE core_tools PkgConfig::JANSSON)
+    add_test(NAME e2e_cli COMMAND e2e_cli $<TARGET_FILE:instantpoints>)
+    set_tests_properties(e2e_cli PROPERTIES LABELS core TIMEOUT 300)
+endif()

@@ -1,0 +1,409 @@
+/* The program as people and scripts meet it: exit codes, what goes to which stream, and what is left when it is stopped.
+ * argv[1] is the program. */
+#include "tests/core_scans.h"
+#include "tests/core_tools.h"
+
+#include <fcntl.h>
+#include <jansson.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { DONE = 0, FAILED = 1, WRONG_USE = 2, LEFT_OUT = 3, ARGUMENTS_MAX = 16 };
+
+static const char *program;
+static char *folder;
+static char out[1 << 16], said[1 << 16]; /* of the last run */
+
+static int set_up(void **state)
+{
+    (void)state;
+    folder = core_folder_make();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    core_folder_remove(folder);
+    return 0;
+}
+
+static void read_text(const char *name, char *text, size_t size)
+{
+    char *path = core_path(folder, "%s", name);
+    FILE *f = fopen(path, "rb");
+    assert_non_null(f);
+    text[fread(text, 1, size - 1, f)] = '\0';
+    fclose(f);
+    unlink(path);
+    free(path);
+}
+
+/* Starts the program in the test's folder with its streams in files.
+ * arguments   separated by blanks
+ * file_limit  bytes that a file may have; 0: any number */
+static pid_t start(const char *arguments, size_t file_limit)
+{
+    pid_t child = fork();
+    if (child != 0) return child;
+    static char copy[1024];
+    char *argv[ARGUMENTS_MAX + 2] = {(char *)(uintptr_t)program};
+    snprintf(copy, sizeof copy, "%s", arguments);
+    int count = 1;
+    for (char *word = strtok(copy, " "); word != NULL && count <= ARGUMENTS_MAX; word = strtok(NULL, " ")) argv[count++] = word;
+    if (chdir(folder) != 0 || freopen("stdout", "wb", stdout) == NULL || freopen("stderr", "wb", stderr) == NULL) _exit(98);
+    if (file_limit > 0) setrlimit(RLIMIT_FSIZE, &(struct rlimit){file_limit, file_limit});
+    execv(program, argv);
+    _exit(99);
+}
+
+static int finish(pid_t child)
+{
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    read_text("stdout", out, sizeof out);
+    read_text("stderr", said, sizeof said);
+    if (!WIFEXITED(status)) fail_msg("ended by signal %d; it said: %s", WTERMSIG(status), said);
+    return WEXITSTATUS(status);
+}
+
+static int run(const char *arguments)
+{
+    return finish(start(arguments, 0));
+}
+
+static void expect(const char *arguments, int code)
+{
+    int got = run(arguments);
+    if (got != code) fail_msg("`instantpoints %s` ended with %d instead of %d; it said: %s", arguments, got, code, said);
+}
+
+static uint32_t lines_of(const char *text)
+{
+    uint32_t lines = 0;
+    for (; *text != '\0'; text++) lines += *text == '\n';
+    return lines;
+}
+
+static json_t *parse_output(void)
+{
+    json_error_t at;
+    json_t *json = json_loads(out, JSON_REJECT_DUPLICATES, &at);
+    if (json == NULL) fail_msg("line %d: %s in: %s", at.line, at.text, out);
+    return json;
+}
+
+static json_int_t integer_at(json_t *object, const char *key)
+{
+    json_t *value = json_object_get(object, key);
+    if (!json_is_integer(value)) fail_msg("no whole number \"%s\" in: %s", key, out);
+    return json_integer_value(value);
+}
+
+static void make_las(const char *name, uint32_t count)
+{
+    int32_t(*xyz)[3] = malloc(count * sizeof *xyz);
+    uint64_t random = count;
+    char *path = core_path(folder, "%s", name);
+    assert_non_null(xyz);
+    for (uint32_t i = 0; i < count; i++)
+        for (int a = 0; a < 3; a++) xyz[i][a] = (int32_t)core_below(&random, 1000000);
+    core_las las = {.scale = {0.001, 0.001, 0.001}, .offset = {500000, 5000000, 0}, .xyz = (const int32_t (*)[3])xyz, .count = count};
+    core_las_write(path, &las);
+    free(path), free(xyz);
+}
+
+static void make_text(const char *name, const char *bytes)
+{
+    char *path = core_path(folder, "%s", name);
+    core_file_write(path, bytes, strlen(bytes));
+    free(path);
+}
+
+static bool is_there(const char *name)
+{
+    char *path = core_path(folder, "%s", name);
+    bool there = core_exists(path);
+    free(path);
+    return there;
+}
+
+static void wrong_use_is_exit_code_2_and_one_sentence(void **state)
+{
+    static const char *const wrong[] = {
+        "nonsense", "build", "build a.las", "build -o", "build a.las -o x.ipts --nonsense", "build a.las -o x.ipts --threads 0",
+        "build a.las -o x.ipts --threads many", "build a.las -o x.ipts --memory -5", "build a.las -o x.ipts --inner-depth 10",
+        "build a.las -o x.ipts --inner-depth 7x", "info", "info a b", "info --force x", "check", "check a b", "help nonsense",
+        "check --memory 1G x", "-x", "--nonsense",
+    };
+    (void)state;
+    make_las("a.las", 10);
+    for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        expect(wrong[k], WRONG_USE);
+        assert_string_equal(out, "");
+        if (lines_of(said) != 1 || strncmp(said, "instantpoints", 13) != 0) fail_msg("%s: %s", wrong[k], said);
+        assert_false(is_there("x.ipts"));
+    }
+    expect("", WRONG_USE); /* the page of all commands */
+    assert_string_equal(out, "");
+    assert_non_null(strstr(said, "usage:"));
+}
+
+static void help_goes_to_standard_output(void **state)
+{
+    static const char *const pages[] = {"help", "--help", "-h", "help build", "build --help", "build -h", "info --help", "check --help",
+                                        "help info", "help check", "help shot", "help view", "--version"};
+    (void)state;
+    for (size_t k = 0; k < sizeof pages / sizeof pages[0]; k++) {
+        expect(pages[k], DONE);
+        assert_string_equal(said, "");
+        assert_true(strlen(out) > 10 && out[strlen(out) - 1] == '\n');
+    }
+    static char page[sizeof out];
+    expect("help build", DONE);
+    strcpy(page, out);
+    expect("build --help", DONE);
+    assert_string_equal(page, out);
+    assert_non_null(strstr(out, "--memory"));
+    assert_non_null(strstr(out, "--threads"));
+    assert_null(strstr(out, "--fov"));
+}
+
+static void a_site_is_built_told_and_checked(void **state)
+{
+    (void)state;
+    make_las("a.las", 50000);
+    make_text("b.xyz", "500000 5000000 1\n500001 5000001 2\n500002.5 5000002 3\n");
+    expect("build a.las b.xyz -o site.ipts --threads 2", DONE);
+    assert_non_null(strstr(out, "50,003"));
+    expect("info site.ipts", DONE);
+    assert_string_equal(said, "");
+    assert_non_null(strstr(out, "50,003"));
+    assert_non_null(strstr(out, "a.las"));
+    expect("info site.ipts --stats", DONE);
+    expect("check site.ipts", DONE);
+    assert_int_equal(lines_of(out), 1);
+    assert_non_null(strstr(out, "50003"));
+}
+
+static void json_is_all_there_is_on_standard_output(void **state)
+{
+    json_t *json;
+    (void)state;
+    make_las("a.las", 50000);
+    make_text("b.xyz", "500000 5000000 1\nnan 1 1\n500002.5 5000002 3\n");
+    expect("build a.las b.xyz -o site.ipts --json", DONE);
+    json = parse_output();
+    assert_int_equal(integer_at(json, "points"), 50002);
+    assert_int_equal(integer_at(json, "dropped"), 1);
+    assert_int_equal(json_array_size(json_object_get(json, "sources")), 2);
+    assert_int_equal(json_array_size(json_object_get(json, "left_out")), 0);
+    json_decref(json);
+    for (int stats = 0; stats < 2; stats++) {
+        expect(stats ? "info site.ipts --json --stats" : "info --json site.ipts", DONE);
+        assert_string_equal(said, "");
+        json = parse_output();
+        assert_int_equal(integer_at(json, "points"), 50002);
+        assert_true(json_is_object(json_object_get(json, "stats")) == (stats == 1));
+        json_t *min = json_object_get(json_object_get(json, "bounds"), "min");
+        assert_true(json_number_value(json_array_get(min, 0)) == 500000);
+        json_decref(json);
+    }
+    expect("check site.ipts --json", DONE);
+    json = parse_output();
+    assert_true(json_is_true(json_object_get(json, "ok")));
+    assert_int_equal(integer_at(json, "points"), 50002);
+    assert_int_equal(json_array_size(json_object_get(json, "findings")), 0);
+    json_decref(json);
+}
+
+static void json_of_names_that_are_no_text_parses(void **state)
+{
+    (void)state;
+    make_las("caf\xe9\"\\\x01.las", 100);
+    expect("build caf\xe9\"\\\x01.las -o si\xfft\x02\".ipts --json", DONE);
+    json_decref(parse_output());
+    expect("info si\xfft\x02\".ipts --json", DONE);
+    json_decref(parse_output());
+    expect("check si\xfft\x02\".ipts --json", DONE);
+    json_decref(parse_output());
+    make_text("bad\xe9.las", "LASF");
+    expect("build caf\xe9\"\\\x01.las bad\xe9.las -o two.ipts --json", LEFT_OUT);
+    json_t *json = parse_output();
+    assert_int_equal(json_array_size(json_object_get(json, "left_out")), 1);
+    json_decref(json);
+}
+
+static void input_left_out_is_exit_code_3(void **state)
+{
+    (void)state;
+    make_las("a.las", 1000);
+    make_text("b.las", "LASF is not enough");
+    expect("build a.las b.las -o site.ipts", LEFT_OUT);
+    assert_non_null(strstr(said, "b.las"));
+    expect("check site.ipts", DONE);
+    /* a damaged file, of which a part is read */
+    char *path = core_path(folder, "a.las");
+    assert_int_equal(truncate(path, 227 + 20 * 500 + 3), 0);
+    free(path);
+    expect("build a.las -o part.ipts --json", LEFT_OUT);
+    json_t *json = parse_output();
+    assert_int_equal(integer_at(json, "points"), 500);
+    json_decref(json);
+    assert_non_null(strstr(said, "a.las"));
+}
+
+static void failures_are_exit_code_1_and_one_sentence(void **state)
+{
+    static const char *const failing[] = {
+        "build missing.las -o x.ipts", "build b.las -o x.ipts", "build a.las -o nowhere/x.ipts", "build a.las -o x.ipts --temp-dir nowhere",
+        "build a.las -o x.ipts --memory 1M", "build a.las -o full", "build a.las -o full --force", "info missing.ipts", "info full", "check full -q", "info a.las",
+    };
+    (void)state;
+    make_las("a.las", 10);
+    make_text("b.las", "LASF");
+    char *full = core_path(folder, "full");
+    assert_int_equal(mkdir(full, 0777), 0);
+    free(full);
+    make_text("full/note.txt", "mine");
+    for (size_t k = 0; k < sizeof failing / sizeof failing[0]; k++) {
+        expect(failing[k], FAILED);
+        if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0) fail_msg("%s: %s", failing[k], said);
+        assert_false(is_there("x.ipts"));
+        assert_true(is_there("full/note.txt"));
+    }
+    expect("build a.las -o site.ipts", DONE);
+    expect("build a.las -o site.ipts", FAILED);
+    assert_non_null(strstr(said, "--force"));
+    expect("build a.las -o site.ipts --force", DONE);
+}
+
+static void check_names_what_is_damaged(void **state)
+{
+    (void)state;
+    make_las("a.las", 20000);
+    expect("build a.las -o site.ipts", DONE);
+    char *path = core_path(folder, "site.ipts/points-00.bin");
+    size_t size;
+    uint8_t *bytes = core_file_read(path, &size);
+    bytes[size / 2] ^= 4;
+    core_file_write(path, bytes, size);
+    expect("check site.ipts", FAILED);
+    assert_non_null(strstr(said, "site.ipts/points-00.bin: byte "));
+    expect("check site.ipts --json", FAILED);
+    json_t *json = parse_output();
+    assert_true(json_is_false(json_object_get(json, "ok")));
+    assert_int_equal(json_array_size(json_object_get(json, "findings")), 1);
+    json_decref(json);
+    unlink(path);
+    expect("check site.ipts --json", FAILED);
+    json_decref(parse_output());
+    free(bytes), free(path);
+}
+
+static void a_signal_stops_a_build_and_leaves_nothing(void **state)
+{
+    static const int signals[] = {SIGINT, SIGTERM};
+    uint32_t stopped = 0;
+    (void)state;
+    make_las("a.las", 600000);
+    for (int k = 0; k < 6; k++) {
+        pid_t child = start("build a.las -o site.ipts --threads 2", 0);
+        nanosleep(&(struct timespec){.tv_nsec = 10000000L << k}, NULL);
+        kill(child, signals[k % 2]);
+        int status, code;
+        assert_int_equal(waitpid(child, &status, 0), child);
+        read_text("stdout", out, sizeof out);
+        read_text("stderr", said, sizeof said);
+        if (WIFSIGNALED(status)) { /* before the program listens to signals */
+            assert_int_equal(WTERMSIG(status), signals[k % 2]);
+            assert_int_equal(core_entries(folder), 1);
+            continue;
+        }
+        code = WEXITSTATUS(status);
+        if (code == DONE) {
+            assert_int_equal(run("check site.ipts"), DONE);
+            char *path = core_path(folder, "site.ipts");
+            core_folder_remove(path);
+            continue;
+        }
+        assert_int_equal(code, FAILED);
+        assert_string_equal(out, "");
+        assert_non_null(strstr(said, "stopped"));
+        assert_int_equal(core_entries(folder), 1); /* the scan */
+        stopped++;
+    }
+    assert_true(stopped > 0);
+}
+
+static void a_killed_build_can_be_started_again(void **state)
+{
+    (void)state;
+    make_las("a.las", 600000);
+    for (int k = 0; k < 3; k++) {
+        pid_t child = start("build a.las -o site.ipts --threads 2", 0);
+        nanosleep(&(struct timespec){.tv_nsec = 30000000L << k}, NULL);
+        kill(child, SIGKILL);
+        waitpid(child, NULL, 0);
+    }
+    if (!is_there("site.ipts/metadata.json")) expect("build a.las -o site.ipts", DONE);
+    expect("check site.ipts", DONE);
+    char *path = core_path(folder, "site.ipts");
+    core_folder_remove(path);
+    unlink((path = core_path(folder, "stdout"))), free(path);
+    unlink((path = core_path(folder, "stderr"))), free(path);
+    assert_int_equal(core_entries(folder), 1);
+}
+
+static void a_full_disk_is_one_sentence_and_leaves_nothing(void **state)
+{
+    static const size_t limits[] = {5000, 100000, 1500000};
+    (void)state;
+    make_las("a.las", 200000);
+    signal(SIGXFSZ, SIG_IGN); /* inherited: a write beyond the limit fails as on a full disk */
+    for (int k = 0; k < 3; k++) {
+        assert_int_equal(finish(start("build a.las -o site.ipts -q", limits[k])), FAILED);
+        assert_string_equal(out, "");
+        if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0) fail_msg("%s", said);
+        assert_int_equal(core_entries(folder), 1);
+    }
+    signal(SIGXFSZ, SIG_DFL);
+}
+
+static void a_limit_on_the_size_of_files_is_like_a_full_disk(void **state)
+{
+    (void)state;
+    make_las("a.las", 20000);
+    assert_int_equal(finish(start("build a.las -o site.ipts -q", 5000)), FAILED); /* not ended by SIGXFSZ */
+    assert_int_equal(core_entries(folder), 1);
+}
+
+#define CASE(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {
+        CASE(wrong_use_is_exit_code_2_and_one_sentence),
+        CASE(help_goes_to_standard_output),
+        CASE(a_site_is_built_told_and_checked),
+        CASE(json_is_all_there_is_on_standard_output),
+        CASE(json_of_names_that_are_no_text_parses),
+        CASE(input_left_out_is_exit_code_3),
+        CASE(failures_are_exit_code_1_and_one_sentence),
+        CASE(check_names_what_is_damaged),
+        CASE(a_signal_stops_a_build_and_leaves_nothing),
+        CASE(a_killed_build_can_be_started_again),
+        CASE(a_full_disk_is_one_sentence_and_leaves_nothing),
+        CASE(a_limit_on_the_size_of_files_is_like_a_full_disk),
+    };
+    if (argc < 2) return 2;
+    program = realpath(argv[1], NULL);
+    return program == NULL ? 2 : cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,246 @@
+#include "render/shot.h"
+#include "tests/ref_picture.h"
+#include "tests/render_tools.h"
+
+#include <png.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { WIDTH = 480, HEIGHT = 270, PIXELS = WIDTH * HEIGHT };
+
+static void take(const render_site *site, const char *name, rend_shot_options options,
+                 rend_shot_result *result)
+{
+    mospt_err err = {0};
+    char *path = core_path(site->folder, "%s", name);
+    options.path = path;
+    if (options.width == 0) options.width = WIDTH, options.height = HEIGHT;
+    CORE_NEED(rend_shot(site->dataset, &options, result, &err));
+    free(path);
+}
+
+static void assert_same_picture(const render_site *a, const char *a_name, const render_site *b,
+                                const char *b_name)
+{
+    char *a_path = core_path(a->folder, "%s", a_name), *b_path = core_path(b->folder, "%s", b_name);
+    size_t a_size, b_size;
+    uint8_t *x = core_file_read(a_path, &a_size), *y = core_file_read(b_path, &b_size);
+    assert_int_equal(a_size, b_size);
+    assert_memory_equal(x, y, a_size);
+    free(x);
+    free(y);
+    free(a_path);
+    free(b_path);
+}
+
+/* Pixels that are not of the background, which must be black. */
+static void covered_pixels(const render_site *site, const char *name, uint8_t covered[PIXELS])
+{
+    char *path = core_path(site->folder, "%s", name);
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    assert_int_equal(image.width, WIDTH);
+    assert_int_equal(image.height, HEIGHT);
+    uint8_t *rgb = malloc(PNG_IMAGE_SIZE(image));
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    for (size_t i = 0; i < PIXELS; i++)
+        covered[i] = rgb[3 * i] | rgb[3 * i + 1] | rgb[3 * i + 2] ? 1 : 0;
+    free(rgb);
+    free(path);
+}
+
+/* White points of one pixel on black. */
+static const rend_look MASK = {.size_mode = REND_SIZE_FIXED,
+                               .point_px = 1,
+                               .colour = REND_COLOUR_ELEVATION,
+                               .no_edl = true,
+                               .has_background = true};
+
+static void compare_with_raw(core_kind kind, const rend_camera_options *camera, double may_miss)
+{
+    render_site site;
+    rend_camera c;
+    mospt_err err = {0};
+    rend_shot_result result;
+    uint8_t *ours = malloc(PIXELS), *raw = malloc(PIXELS);
+    uint32_t both = 0, only_ours = 0, only_raw = 0;
+    render_site_make(kind, 60000, NULL, &site);
+    take(&site, "mask.png", (rend_shot_options){.look = MASK, .camera = *camera}, &result);
+    covered_pixels(&site, "mask.png", ours);
+    CORE_NEED(rend_camera_make(camera, site.dataset, WIDTH, HEIGHT, &c, &err));
+    ref_picture_cover(site.dataset, &c, WIDTH, HEIGHT, raw);
+    for (size_t i = 0; i < PIXELS; i++)
+        both += ours[i] && raw[i], only_ours += ours[i] > raw[i], only_raw += raw[i] > ours[i];
+    assert_true(both > 500);
+    /* GL places points on 1/256 of a pixel; levels below a pixel may leave one out. */
+    assert_true(only_ours <= both / 100 + 2);
+    assert_true(only_raw <= both * may_miss + 2);
+    free(ours);
+    free(raw);
+    render_site_fini(&site);
+}
+
+static void all_points_cover_what_a_plain_draw_covers(void **unused)
+{
+    (void)unused;
+    const rend_camera_options overview = {0};
+    compare_with_raw(CORE_PLANE, &overview, 0.08);
+    compare_with_raw(CORE_CLUSTERED, &overview, 0.08);
+}
+
+static void seen_from_inside_not_a_pixel_is_missing(void **unused)
+{
+    (void)unused;
+    render_site site;
+    render_site_make(CORE_UNIFORM, 999, NULL, &site);
+    rend_camera_options inside = {.has_eye = true, .has_target = true};
+    const mospt_metadata *m = &site.dataset->metadata;
+    for (int a = 0; a < 3; a++)
+        inside.eye[a] = (m->low[a] + m->high[a]) / 2, inside.target[a] = m->high[a];
+    render_site_fini(&site);
+    compare_with_raw(CORE_UNIFORM, &inside, 0.01);
+}
+
+static void the_same_options_give_the_same_bytes(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result a, b;
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    take(&site, "a.png", (rend_shot_options){.limits = {.budget_points = 20000}}, &a);
+    take(&site, "b.png", (rend_shot_options){.limits = {.budget_points = 20000}}, &b);
+    assert_same_picture(&site, "a.png", &site, "b.png");
+    assert_true(a.points_drawn <= 20000 && a.points_drawn > 0 && a.points_drawn == b.points_drawn);
+    render_site_fini(&site);
+}
+
+static void cache_sizes_do_not_show(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result all, paged;
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    take(&site, "a.png", (rend_shot_options){.path = NULL}, &all);
+    take(&site, "b.png",
+         (rend_shot_options){.limits = {.ram_cache_bytes = 1, .gpu_cache_bytes = 1}}, &paged);
+    assert_same_picture(&site, "a.png", &site, "b.png");
+    assert_int_equal(all.points_drawn, paged.points_drawn);
+    render_site_fini(&site);
+}
+
+static void a_site_does_not_shake_at_utm_coordinates(void **unused)
+{
+    (void)unused;
+    render_site here, there;
+    rend_shot_result result;
+    mospt_grid grid = {0};
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &here);
+    grid = here.dataset->metadata.grid;
+    const int64_t shift[3] = {(int64_t)(500000 / grid.step), (int64_t)(5400000 / grid.step), 0};
+    render_site_make(CORE_CLUSTERED, 60000, shift, &there);
+    take(&here, "here.png", (rend_shot_options){.path = NULL}, &result);
+    take(&there, "there.png", (rend_shot_options){.path = NULL}, &result);
+    assert_same_picture(&here, "here.png", &there, "there.png");
+    rend_shot_options inside = {.camera = {.has_eye = true, .has_target = true}};
+    const mospt_metadata *m = &here.dataset->metadata;
+    for (int a = 0; a < 3; a++)
+        inside.camera.eye[a] = (m->low[a] + m->high[a]) / 2, inside.camera.target[a] = m->high[a];
+    take(&here, "here.png", inside, &result);
+    for (int a = 0; a < 3; a++)
+        inside.camera.eye[a] += (double)shift[a] * grid.step,
+            inside.camera.target[a] += (double)shift[a] * grid.step;
+    take(&there, "there.png", inside, &result);
+    assert_same_picture(&here, "here.png", &there, "there.png");
+    render_site_fini(&here);
+    render_site_fini(&there);
+}
+
+static void every_look_can_be_drawn(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result result;
+    render_site_make(CORE_CLUSTERED, 5000, NULL, &site);
+    for (int colour = 0; colour < REND_COLOUR_COUNT; colour++)
+        for (int mode = REND_SIZE_AUTO; mode <= REND_SIZE_WORLD; mode++) {
+            rend_look look = {
+                .colour = (rend_colour)colour, .size_mode = (rend_size_mode)mode, .point_px = 5};
+            look.point_m = 3 * (float)site.dataset->metadata.grid.step,
+            look.no_edl = mode == REND_SIZE_FIXED;
+            take(&site, "a.png", (rend_shot_options){.look = look, .width = 37, .height = 23},
+                 &result);
+            assert_true(result.points_drawn > 0);
+        }
+    render_site_fini(&site);
+}
+
+static void one_point_and_copies_of_it_can_be_drawn(void **unused)
+{
+    (void)unused;
+    const core_kind kinds[] = {CORE_UNIFORM, CORE_IDENTICAL, CORE_LINE};
+    const uint32_t counts[] = {1, 1000, 1000};
+    for (int i = 0; i < 3; i++) {
+        render_site site;
+        rend_shot_result result;
+        uint8_t *covered = malloc(PIXELS);
+        uint32_t sum = 0;
+        render_site_make(kinds[i], counts[i], NULL, &site);
+        take(&site, "a.png", (rend_shot_options){.look = MASK}, &result);
+        covered_pixels(&site, "a.png", covered);
+        for (size_t p = 0; p < PIXELS; p++)
+            sum += covered[p];
+        assert_true(sum >= 1);
+        free(covered);
+        render_site_fini(&site);
+    }
+}
+
+static void what_cannot_be_drawn_is_an_error_and_no_file(void **unused)
+{
+    (void)unused;
+    render_site site;
+    mospt_err err = {0};
+    render_site_make(CORE_CLUSTERED, 2000, NULL, &site);
+    char *path = core_path(site.folder, "a.png"),
+         *nowhere = core_path(site.folder, "no/such/a.png");
+    uint32_t before = core_entries(site.folder);
+    CORE_FAILS(
+        rend_shot(site.dataset, &(rend_shot_options){.path = path, .width = 1 << 20}, NULL, &err),
+        MOSPT_EINVAL);
+    CORE_FAILS(rend_shot(site.dataset, &(rend_shot_options){.path = nowhere}, NULL, &err),
+               MOSPT_EIO);
+    assert_int_equal(core_entries(site.folder), before);
+    free(path);
+    free(nowhere);
+    render_site_fini(&site);
+}
+
+static void damage_is_told_and_drawn_around(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result result;
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    render_site_damage(&site, 2);
+    take(&site, "a.png", (rend_shot_options){.path = NULL}, &result);
+    assert_int_equal(result.damaged_nodes, 1);
+    assert_int_equal(result.damage.code, MOSPT_EFORMAT);
+    render_site_fini(&site);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_points_cover_what_a_plain_draw_covers),
+        cmocka_unit_test(seen_from_inside_not_a_pixel_is_missing),
+        cmocka_unit_test(the_same_options_give_the_same_bytes),
+        cmocka_unit_test(cache_sizes_do_not_show),
+        cmocka_unit_test(a_site_does_not_shake_at_utm_coordinates),
+        cmocka_unit_test(every_look_can_be_drawn),
+        cmocka_unit_test(one_point_and_copies_of_it_can_be_drawn),
+        cmocka_unit_test(what_cannot_be_drawn_is_an_error_and_no_file),
+        cmocka_unit_test(damage_is_told_and_drawn_around),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

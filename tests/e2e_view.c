@@ -1,0 +1,54 @@
+/* A window, run where there is a display (CI: Xvfb). */
+#include "render/view.h"
+#include "tests/render_tools.h"
+
+#include <png.h>
+#include <stdlib.h>
+
+static void a_window_shows_the_dataset_and_a_line_of_figures(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_view_result result;
+    mospt_err err = {0};
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    char *path = core_path(site.folder, "window.png");
+    const rend_view_options options = {
+        .frames = 30, .width = 640, .height = 400, .screenshot = path, .help = true};
+    CORE_NEED(rend_view(site.dataset, &options, &result, &err));
+    assert_int_equal(result.frames, 30);
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    uint8_t *rgb = malloc(PNG_IMAGE_SIZE(image));
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    uint32_t white = 0; /* of the words in the first lines */
+    for (size_t i = 0; i < (size_t)image.width * 24; i++)
+        white += rgb[3 * i] > 230 && rgb[3 * i + 2] > 230;
+    assert_true(white > 50);
+    free(rgb);
+    free(path);
+    render_site_fini(&site);
+}
+
+static void without_a_display_one_sentence_says_so(void **unused)
+{
+    (void)unused;
+    render_site site;
+    mospt_err err = {0};
+    const rend_view_options options = {.frames = 1};
+    render_site_make(CORE_CLUSTERED, 1000, NULL, &site);
+    unsetenv("DISPLAY");
+    unsetenv("WAYLAND_DISPLAY");
+    CORE_FAILS(rend_view(site.dataset, &options, NULL, &err), MOSPT_EINVAL);
+    render_site_fini(&site);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_window_shows_the_dataset_and_a_line_of_figures),
+        cmocka_unit_test(without_a_display_one_sentence_says_so),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,33 @@
+# Tests of render/. Included by tests/CMakeLists.txt.
+if(NOT TARGET PkgConfig::CMOCKA)
+    pkg_check_modules(CMOCKA REQUIRED IMPORTED_TARGET cmocka)
+endif()
+
+add_library(render_tools STATIC ref_select.c render_tools.c)
+target_link_libraries(render_tools PUBLIC rend core_tools)
+
+# Memory that the graphics drivers and fontconfig keep for ever is not ours to free.
+set(render_environment
+    "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/render_leaks.supp:print_suppressions=0")
+
+foreach(name cache camera loader orbit pages select stage)
+    add_executable(test_${name} test_${name}.c)
+    target_link_libraries(test_${name} PRIVATE render_tools)
+    add_test(NAME ${name} COMMAND test_${name})
+    set_tests_properties(${name} PROPERTIES LABELS render TIMEOUT 300)
+endforeach()
+
+# With a context: the software renderer will do, and no display is needed.
+add_executable(e2e_shot e2e_shot.c keep_libraries.c ref_picture.c)
+target_link_libraries(e2e_shot PRIVATE render_tools PkgConfig::PNG)
+add_test(NAME e2e_shot COMMAND e2e_shot)
+set_tests_properties(e2e_shot PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+
+# A window, where there is a display to be had without one.
+find_program(XVFB_RUN xvfb-run)
+if(XVFB_RUN)
+    add_executable(e2e_view e2e_view.c keep_libraries.c)
+    target_link_libraries(e2e_view PRIVATE render_tools PkgConfig::PNG)
+    add_test(NAME e2e_view COMMAND ${XVFB_RUN} -a -s "-screen 0 1024x768x24" $<TARGET_FILE:e2e_view>)
+    set_tests_properties(e2e_view PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+endif()

@@ -1,0 +1,267 @@
+/* The multi-pass builder writes the same dataset as the builder in memory, whatever memory, levels, batches and threads. */
+#include "tests/core_tools.h"
+
+#include "mospt/writer.h"
+#include "preprocess/pass.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <signal.h>
+
+typedef struct {
+    uint32_t levels, threads, batch;
+    size_t block_size, store_memory, solve_memory;
+} way;
+
+static bool go_on(void *context, const prep_written *written)
+{
+    (void)written;
+    uint32_t *left = context;
+    return left == NULL || (*left)-- > 0;
+}
+
+/* Builds the site; `reports_left` NULL: until the end. */
+static bool pass_build(const core_site *site, const prep_shape *shape, const way *w, const char *path, const char *scratch,
+                       uint32_t *reports_left, mospt_err *err)
+{
+    prep_workers *workers = NULL;
+    prep_store *store = NULL;
+    mospt_writer *writer = NULL;
+    prep_pass *pass = NULL;
+    prep_written written = {0};
+    mospt_metadata metadata;
+    assert_true(prep_workers_create(w->threads, &workers, err));
+    assert_true(prep_store_create(scratch, site->stride, w->block_size, w->store_memory, &store, err));
+    assert_true(mospt_writer_create(path, shape->inner_depth, &writer, err));
+    uint32_t block = prep_store_block_capacity(store);
+    prep_pass_env env = {.shape = shape, .workers = workers, .store = store, .writer = writer, .levels = w->levels,
+                         .batch_count = w->batch > block ? w->batch : block, .solve_memory = w->solve_memory,
+                         .written = &written, .report = go_on, .report_context = reports_left};
+    bool ok = prep_pass_begin(&env, site->grid.root, 0, &pass, err);
+    for (uint32_t i = 0; ok && i < site->count; i += w->batch) {
+        uint32_t n = site->count - i < w->batch ? site->count - i : w->batch;
+        ok = prep_pass_insert(pass, site->records + i * site->stride, n, err);
+    }
+    if (ok) ok = prep_pass_end(pass, err);
+    else prep_pass_abandon(pass);
+    if (ok) {
+        core_metadata_make(site, shape->add_threshold, &metadata);
+        assert_int_equal(written.points, site->count);
+        assert_true(written.points_hash == metadata.points_hash);
+        ok = mospt_writer_commit(writer, &metadata, err);
+        mospt_metadata_fini(&metadata);
+    }
+    mospt_writer_destroy(writer);
+    prep_store_destroy(store);
+    prep_workers_destroy(workers);
+    return ok;
+}
+
+static char *folder;
+
+static int set_up(void **state)
+{
+    (void)state;
+    folder = core_folder_make();
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    core_folder_remove(folder);
+    return 0;
+}
+
+static void check_ways(const core_site *site, uint32_t depth, uint32_t threshold, const way *ways, size_t way_count)
+{
+    prep_shape shape = core_shape(site, depth, threshold);
+    mospt_err err = {0};
+    char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+    core_dataset_make(site, depth, threshold, want);
+    assert_int_equal(core_findings(want, &err), 0);
+    for (size_t k = 0; k < way_count; k++) {
+        CORE_NEED(pass_build(site, &shape, &ways[k], got, folder, NULL, &err));
+        core_assert_same_folders(want, got);
+        core_folder_remove(got);
+        got = core_path(folder, "got.ipts");
+    }
+    core_folder_remove(want);
+    free(got);
+    assert_int_equal(core_entries(folder), 0);
+}
+
+/* Every combination in which the parts of a pass meet each other, thinned by a fixed stride. */
+static void check_all_ways(const core_site *site, uint32_t depth, uint32_t threshold, uint32_t first, uint32_t stride)
+{
+    static const size_t store[] = {0, 3000, 60000, 1 << 30}, solve[] = {0, 20000, 300000, 1 << 30};
+    static const uint32_t threads[] = {1, 2, 7}, batch[] = {1000, 20000, 333}, block[] = {64, 700, 1 << 16};
+    for (uint32_t k = first; k < 4 * 4 * 3 * 3 * 3 * 3; k += stride) {
+        uint32_t n = k;
+        way w = {0};
+        w.store_memory = store[n % 4], n /= 4;
+        w.solve_memory = solve[n % 4], n /= 4;
+        w.levels = 1 + n % 3, n /= 3;
+        w.threads = threads[n % 3], n /= 3;
+        w.batch = batch[n % 3], n /= 3;
+        w.block_size = block[n % 3];
+        check_ways(site, depth, threshold, &w, 1);
+    }
+}
+
+static void any_way_of_building_gives_the_same_bytes(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < CORE_KINDS; kind++) {
+        core_site site;
+        core_site_make((core_kind)kind, 16, 6000, (uint64_t)kind, &site);
+        check_all_ways(&site, 1 + (uint32_t)kind % 5, 30, (uint32_t)kind, 101);
+        core_site_fini(&site);
+    }
+}
+
+static void all_inner_depths_give_the_same_bytes(void **state)
+{
+    (void)state;
+    for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= MOSPT_DEPTH_MAX; depth++) {
+        core_site site;
+        core_site_make(CORE_CLUSTERED, 20, 4000, depth, &site);
+        const way ways[] = {
+            {.levels = 1, .threads = 2, .batch = 500, .block_size = 300},
+            {.levels = 2, .threads = 1, .batch = 4000, .block_size = 300, .solve_memory = 100000},
+            {.levels = 3, .threads = 2, .batch = 1234, .block_size = 300, .store_memory = 2000},
+        };
+        check_ways(&site, depth, 10, ways, 3);
+        core_site_fini(&site);
+    }
+}
+
+static void grids_of_all_widths_give_the_same_bytes(void **state)
+{
+    static const uint32_t bits[] = {0, 1, 2, 3, 4, 21, 31, 32};
+    static const core_kind kinds[] = {CORE_UNIFORM, CORE_CLUSTERED, CORE_COPIES};
+    (void)state;
+    for (size_t k = 0; k < sizeof bits / sizeof bits[0]; k++)
+        for (int kind = 0; kind < 3; kind++) {
+            core_site site;
+            core_site_make(kinds[kind], bits[k], 2000, k, &site);
+            check_all_ways(&site, 3, 8, (uint32_t)(3 * k) + (uint32_t)kind, 307);
+            core_site_fini(&site);
+        }
+}
+
+static void deep_trees_of_neighbours_give_the_same_bytes(void **state)
+{
+    (void)state;
+    core_site site;
+    core_site_make(CORE_LINE, 32, 3000, 1, &site);
+    for (uint32_t i = 0; i < site.count; i++) {
+        mospt_vertex v = mospt_vertex_of(site.records + i * site.stride);
+        v.x = 77 + i % 2, v.y = 5, v.z = 5;
+        memcpy(site.records + i * site.stride, &v, sizeof v);
+    }
+    check_all_ways(&site, 4, 3, 5, 211);
+    core_site_fini(&site);
+}
+
+static void piles_give_the_same_bytes(void **state)
+{
+    static const uint32_t more[] = {99, 100, PREP_PILE_MAX + 100};
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        core_site site;
+        core_site_make(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 1, &site);
+        const way ways[] = {
+            {.levels = 3, .threads = 2, .batch = 65536, .block_size = 1 << 16},
+            {.levels = 1, .threads = 1, .batch = 50000, .block_size = 1 << 14, .store_memory = 1 << 20},
+        };
+        check_ways(&site, 5, 100, ways, k == 2 ? 2 : 1);
+        core_site_fini(&site);
+    }
+}
+
+static void stopping_at_any_report_is_a_cancellation(void **state)
+{
+    (void)state;
+    core_site site;
+    core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
+    prep_shape shape = core_shape(&site, 3, 30);
+    char *got = core_path(folder, "got.ipts");
+    uint32_t reports = 0;
+    for (uint32_t stop_after = 0;; stop_after = stop_after < 10 ? stop_after + 1 : stop_after * 3) {
+        mospt_err err = {0};
+        way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000};
+        uint32_t left = stop_after;
+        if (pass_build(&site, &shape, &w, got, folder, &left, &err)) break;
+        assert_int_equal(err.code, MOSPT_ECANCELLED);
+        assert_false(core_exists(got));
+        reports++;
+    }
+    assert_true(reports > 10);
+    core_folder_remove(got);
+    core_site_fini(&site);
+    assert_int_equal(core_entries(folder), 0);
+}
+
+static void a_scratch_disk_that_fills_up_is_an_error(void **state)
+{
+    /* The scratch file may not grow beyond this; the payloads here stay smaller. */
+    static const rlim_t limits[] = {0, 1000, 20000, 60000};
+    struct rlimit old, small;
+    (void)state;
+    core_site site;
+    core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
+    prep_shape shape = core_shape(&site, 3, 30);
+    char *got = core_path(folder, "got.ipts");
+    signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &old);
+    for (size_t k = 0; k < sizeof limits / sizeof limits[0]; k++) {
+        for (uint32_t threads = 1; threads <= 7; threads += 3) {
+            mospt_err err = {0};
+            way w = {.levels = 2, .threads = threads, .batch = 1000, .block_size = 400};
+            small = old;
+            small.rlim_cur = limits[k];
+            setrlimit(RLIMIT_FSIZE, &small);
+            bool ok = pass_build(&site, &shape, &w, got, folder, NULL, &err);
+            setrlimit(RLIMIT_FSIZE, &old);
+            assert_false(ok);
+            assert_int_equal(err.code, MOSPT_EIO);
+            assert_false(core_exists(got));
+        }
+    }
+    free(got);
+    core_site_fini(&site);
+}
+
+static void a_scratch_folder_that_is_not_there_is_an_error(void **state)
+{
+    (void)state;
+    mospt_err err = {0};
+    core_site site;
+    core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
+    prep_shape shape = core_shape(&site, 3, 30);
+    char *got = core_path(folder, "got.ipts"), *scratch = core_path(folder, "nowhere");
+    way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
+    CORE_FAILS(pass_build(&site, &shape, &w, got, scratch, NULL, &err), MOSPT_EIO);
+    assert_string_equal(err.file, scratch);
+    assert_false(core_exists(got));
+    free(got), free(scratch);
+    core_site_fini(&site);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(any_way_of_building_gives_the_same_bytes),
+        cmocka_unit_test(all_inner_depths_give_the_same_bytes),
+        cmocka_unit_test(grids_of_all_widths_give_the_same_bytes),
+        cmocka_unit_test(deep_trees_of_neighbours_give_the_same_bytes),
+        cmocka_unit_test(piles_give_the_same_bytes),
+        cmocka_unit_test(stopping_at_any_report_is_a_cancellation),
+        cmocka_unit_test(a_scratch_disk_that_fills_up_is_an_error),
+        cmocka_unit_test(a_scratch_folder_that_is_not_there_is_an_error),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

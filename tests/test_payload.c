@@ -1,0 +1,105 @@
+/* The bytes of a node: vertices, then plane after plane. */
+#include "tests/core_tools.h"
+
+#include "mospt/hash.h"
+#include "mospt/payload.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void check(const mospt_schema *schema, uint32_t record_count, uint32_t count)
+{
+    size_t stride = mospt_record_size(schema);
+    uint64_t random = count;
+    uint8_t *records = malloc(record_count * stride + 1), *out = malloc(count * stride + 1), *picked = malloc(count * stride + 1);
+    uint32_t *order = malloc((count + 1) * sizeof *order);
+    mospt_node node = {.level = 3};
+    assert_true(records != NULL && out != NULL && order != NULL && picked != NULL);
+    for (size_t i = 0; i < record_count * stride; i++) records[i] = (uint8_t)core_random(&random);
+    for (uint32_t i = 0; i < count; i++) {
+        order[i] = core_below(&random, record_count);
+        memcpy(picked + i * stride, records + order[i] * stride, stride);
+    }
+    out[count * stride] = 0xa5;
+    mospt_payload_pack(schema, records, order, count, out, &node);
+    assert_int_equal(out[count * stride], 0xa5);
+    assert_int_equal(node.count, count);
+    assert_int_equal(node.level, 3);
+    assert_int_equal(node.payload_size, count * stride);
+    uint8_t *planes = out + count * sizeof(mospt_vertex);
+    for (uint32_t i = 0; i < count; i++) {
+        assert_memory_equal(out + i * sizeof(mospt_vertex), picked + i * stride, sizeof(mospt_vertex));
+        for (uint32_t k = 0; k < schema->count; k++) {
+            size_t size = mospt_attribute_size(&schema->at[k]), at = schema->at[k].offset;
+            assert_memory_equal(planes + count * at + i * size, picked + i * stride + sizeof(mospt_vertex) + at, size);
+        }
+    }
+    assert_true(node.vertices_hash == mospt_hash(out, count * sizeof(mospt_vertex)));
+    assert_true(node.attributes_hash == mospt_hash(planes, count * (size_t)schema->row_size));
+    assert_true(mospt_payload_points_hash(schema, out, planes, count) == mospt_hash_records(picked, stride, count));
+    free(records), free(out), free(order), free(picked);
+}
+
+static void planes_hold_what_records_held(void **state)
+{
+    static const uint32_t counts[] = {0, 1, 2, 255, 256, 257, 1000};
+    mospt_schema none = {0}, one = {0}, all = {0};
+    mospt_err err = {0};
+    char name[16];
+    (void)state;
+    CORE_NEED(mospt_schema_add(&one, "scan", MOSPT_U16, 1, &err));
+    for (int t = 0; t < MOSPT_TYPE_COUNT; t++)
+        for (uint32_t components = 1; components <= 4; components++) {
+            snprintf(name, sizeof name, "t%d_%u", t, components);
+            CORE_NEED(mospt_schema_add(&all, name, (mospt_type)t, components, &err));
+        }
+    for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
+        check(&none, 300, counts[k]);
+        check(&one, 300, counts[k]);
+        check(&all, 300, counts[k]);
+    }
+}
+
+static void the_widest_rows_are_packed(void **state)
+{
+    mospt_schema s = {0};
+    mospt_err err = {0};
+    char name[16];
+    (void)state;
+    for (int i = 0; i < 8; i++) {
+        snprintf(name, sizeof name, "a%d", i);
+        CORE_NEED(mospt_schema_add(&s, name, MOSPT_F64, 255, &err));
+    }
+    CORE_NEED(mospt_schema_add(&s, "b", MOSPT_U8, 64, &err));
+    assert_int_equal(s.row_size, MOSPT_ROW_SIZE_MAX);
+    check(&s, 20, 300);
+}
+
+static void the_sum_of_hashes_does_not_depend_on_the_order_but_on_every_byte(void **state)
+{
+    uint8_t records[50 * 18], back[50 * 18];
+    uint64_t random = 1;
+    (void)state;
+    for (size_t i = 0; i < sizeof records; i++) records[i] = (uint8_t)core_random(&random);
+    for (size_t i = 0; i < 50; i++) memcpy(back + i * 18, records + (49 - i) * 18, 18);
+    uint64_t sum = mospt_hash_records(records, 18, 50);
+    assert_true(sum == mospt_hash_records(back, 18, 50));
+    for (size_t i = 0; i < sizeof records; i++) {
+        records[i] ^= 1;
+        assert_true(sum != mospt_hash_records(records, 18, 50));
+        records[i] ^= 1;
+    }
+    assert_true(sum != mospt_hash_records(records, 18, 49));
+    assert_true(mospt_hash_records(records, 18, 0) == 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(planes_hold_what_records_held),
+        cmocka_unit_test(the_widest_rows_are_packed),
+        cmocka_unit_test(the_sum_of_hashes_does_not_depend_on_the_order_but_on_every_byte),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

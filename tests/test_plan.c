@@ -1,0 +1,108 @@
+/* The division of memory: never more than was given, and always enough of each part to work. */
+#include "tests/core_tools.h"
+
+#include "preprocess/pass.h"
+#include "preprocess/plan.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const uint64_t MIB = UINT64_C(1) << 20;
+
+static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, uint32_t depth)
+{
+    uint64_t buckets = UINT64_C(1) << 3 * p->levels;
+    assert_in_range(p->levels, 1, PREP_PASS_LEVELS_MAX);
+    assert_true(p->levels <= depth);
+    assert_true(3 * (p->levels + depth - 1) <= 32); /* codes of a pass are 32 bits */
+    assert_true(p->batch_count > 0 && p->block_size > 0 && p->solve_memory > 0);
+    uint64_t sum = prep_pass_cells_size(p->levels, depth) + buckets * (p->levels + 1) * p->block_size +
+                   (uint64_t)p->batch_count * 2 * record_size + p->solve_memory + p->store_memory;
+    assert_true(sum <= memory);
+}
+
+static void parts_never_sum_to_more_than_was_given(void **state)
+{
+    uint32_t made = 0;
+    (void)state;
+    for (uint64_t memory = 32 * MIB; memory <= 512 * 1024 * MIB; memory = memory * 5 / 4)
+        for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= MOSPT_DEPTH_MAX; depth++)
+            for (size_t record = 16; record <= 16 + MOSPT_ROW_SIZE_MAX; record = record * 3 / 2 + 1) {
+                prep_plan plan;
+                mospt_err err = {0};
+                if (!prep_plan_make(memory, record, depth, &plan, &err)) {
+                    assert_int_equal(err.code, MOSPT_EINVAL);
+                    assert_true(memory < 2048 * MIB);
+                    continue;
+                }
+                check_plan(&plan, memory, record, depth);
+                made++;
+            }
+    assert_true(made > 1000);
+}
+
+static void the_least_memory_is_enough_for_usual_points(void **state)
+{
+    (void)state;
+    for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= 7; depth++)
+        for (size_t record = 18; record < 100; record += 9) {
+            prep_plan plan;
+            mospt_err err = {0};
+            CORE_NEED(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB, record, depth, &plan, &err));
+            check_plan(&plan, PREP_MEMORY_MIN_MIB * MIB, record, depth);
+            CORE_FAILS(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB - 1, record, depth, &plan, &err), MOSPT_EINVAL);
+        }
+}
+
+static void too_little_memory_is_refused_with_an_amount_that_would_do(void **state)
+{
+    (void)state;
+    for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= MOSPT_DEPTH_MAX; depth++)
+        for (size_t record = 18; record <= 16 + MOSPT_ROW_SIZE_MAX; record = record * 2) {
+            prep_plan plan;
+            mospt_err err = {0};
+            uint64_t memory = MIB;
+            unsigned asked = 0;
+            /* Whoever does as told gets there within a few steps. */
+            while (!prep_plan_make(memory, record, depth, &plan, &err)) {
+                unsigned long long least;
+                const char *at = strstr(err.message, "at least ");
+                assert_non_null(at);
+                assert_int_equal(sscanf(at, "at least %llu MiB", &least), 1);
+                assert_true(least * MIB > memory);
+                memory = least * MIB;
+                assert_true(++asked < 20);
+            }
+            check_plan(&plan, memory, record, depth);
+        }
+}
+
+static void a_block_of_a_spool_fits_a_batch(void **state)
+{
+    /* finish_large() fills batches with whole blocks. */
+    (void)state;
+    for (uint64_t memory = 64 * MIB; memory <= 64 * 1024 * MIB; memory *= 2)
+        for (uint32_t depth = 1; depth <= MOSPT_DEPTH_MAX; depth++)
+            for (size_t record = 16; record < 400; record += 13) {
+                prep_plan plan;
+                if (prep_plan_make(memory, record, depth, &plan, NULL)) assert_true(plan.block_size / record <= 65536);
+            }
+}
+
+static void the_machine_has_memory(void **state)
+{
+    (void)state;
+    assert_true(prep_plan_machine_memory() > 16 * MIB);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parts_never_sum_to_more_than_was_given),
+        cmocka_unit_test(the_least_memory_is_enough_for_usual_points),
+        cmocka_unit_test(too_little_memory_is_refused_with_an_amount_that_would_do),
+        cmocka_unit_test(a_block_of_a_spool_fits_a_batch),
+        cmocka_unit_test(the_machine_has_memory),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
