@@ -21,7 +21,8 @@ static const struct {
                   "Raw scans are built first, into a temporary dataset or the one that -o names. In the window, F1 shows the keys.\n"},
     [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",
                   "Without --eye and --target the picture shows all of the site. The same dataset and options give the same bytes.\n"},
-    [CLI_INFO] = {"info", "NAME.ipts", "say what is in a dataset", ""},
+    [CLI_INFO] = {"info", "NAME.ipts | SCAN", "say what is in a dataset, or in a scan file",
+                  "Of a scan file: its format, what it holds, and what looks wrong; nothing is built.\n"},
     [CLI_CHECK] = {"check", "NAME.ipts", "prove that nothing in a dataset is lost or damaged",
                    "Reads every byte: checksums, the place of every point, every promise of the structure.\n"},
 };
@@ -87,6 +88,7 @@ static bool o_screenshot(cli_options *o, const char *v) { return (o->screenshot 
 static bool o_json(cli_options *o, const char *v) { return (void)v, o->json = true; }
 static bool o_stats(cli_options *o, const char *v) { return (void)v, o->stats = true; }
 static bool o_force(cli_options *o, const char *v) { return (void)v, o->force = true; }
+static bool o_each(cli_options *o, const char *v) { return (void)v, o->each = true; }
 static bool o_quiet(cli_options *o, const char *v) { return (void)v, o->quiet = true; }
 static bool o_help(cli_options *o, const char *v) { return (void)v, o->help = true; }
 static bool o_no_edl(cli_options *o, const char *v) { return (void)v, o->look.no_edl = true; }
@@ -170,6 +172,7 @@ static const struct {
     const char *help;
 } options[] = {
     {"output", "PATH", 'o', B | V | S, o_output, "where the dataset or the picture goes"},
+    {"each", NULL, 0, B, o_each, "one dataset per scan file, in the folder -o; only what has changed is built"},
     {"force", NULL, 0, B | V, o_force, "replace a dataset that is there"},
     {"threads", "N", 0, B | V | S, o_threads, "threads of the builder (default: one per processor)"},
     {"memory", "SIZE", 0, B | V | S, o_memory, "most memory the build takes, 64M or more (default: a quarter of the machine)"},
@@ -191,6 +194,7 @@ static const struct {
     {"gpu-cache", "SIZE", 0, V | S, o_gpu, "most graphics memory for nodes (default: 1G)"},
     {"frames", "N", 0, V, o_frames, "close the window after so many frames"},
     {"screenshot", "PATH", 0, V, o_screenshot, "write the window's picture when it closes"},
+    {"columns", "NAMES", 0, I, o_columns, NULL},
     {"stats", NULL, 0, I, o_stats, "read every point: extent, means, memory of other structures"},
     {"json", NULL, 0, B | V | S | I | C, o_json, "the result as JSON on standard output"},
     {"quiet", NULL, 'q', B | V | S | C, o_quiet, "no progress line"},

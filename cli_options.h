@@ -9,7 +9,7 @@ typedef struct {
     cli_command command;
     const char *const *paths; /* [path_count], borrowed from argv */
     size_t path_count;
-    bool help, json, stats, force, quiet;
+    bool help, json, stats, force, quiet, each;
     const char *output, *temp_dir, *columns, *screenshot;
     uint32_t threads, inner_depth; /* 0: default */
     uint64_t memory;               /* bytes; 0: default */

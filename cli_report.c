@@ -1,32 +1,12 @@
 #include "cli_report.h"
 
+#include "cli_words.h"
+
 #include <inttypes.h>
-#include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { UNKNOWN_SHOWN = 10 };
-
-/* 12345678 as "12,345,678". */
-static const char *grouped(uint64_t n, char text[32])
-{
-    char digits[24];
-    int length = snprintf(digits, sizeof digits, "%" PRIu64, n), out = 0;
-    for (int i = 0; i < length; i++) {
-        if (i > 0 && (length - i) % 3 == 0) text[out++] = ',';
-        text[out++] = digits[i];
-    }
-    text[out] = '\0';
-    return text;
-}
-
-static void bytes_text(uint64_t bytes, char text[32])
-{
-    if (bytes < 10000) snprintf(text, 32, "%" PRIu64 " bytes", bytes);
-    else if (bytes < 10000000) snprintf(text, 32, "%.0f kB", (double)bytes / 1e3);
-    else if (bytes < UINT64_C(10000000000)) snprintf(text, 32, "%.1f MB", (double)bytes / 1e6);
-    else snprintf(text, 32, "%.2f GB", (double)bytes / 1e9);
-}
 
 void cli_report_losses(const prep_build_result *r)
 {
@@ -51,9 +31,9 @@ void cli_report_losses(const prep_build_result *r)
 void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
 {
     char number[32], output[32], scratch[32];
-    bytes_text(output_bytes, output);
-    bytes_text(scratch_bytes, scratch);
-    fprintf(stderr, "%s points: the dataset takes %s", grouped(points, number), output);
+    cli_bytes_text(output_bytes, output);
+    cli_bytes_text(scratch_bytes, scratch);
+    fprintf(stderr, "%s points: the dataset takes %s", cli_grouped(points, number), output);
     if (scratch_bytes > 0) fprintf(stderr, ", and up to %s of scratch space", scratch);
     fprintf(stderr, "\n");
 }
@@ -80,7 +60,7 @@ static void print_reasons(FILE *out, const mospt_metadata *m)
                     if (j < i) seen = true;
                     sum += m->sources[j].drop_count[q];
                 }
-            if (!seen) fprintf(out, ", %s %s", grouped(sum, number), reason);
+            if (!seen) fprintf(out, ", %s %s", cli_grouped(sum, number), reason);
         }
 }
 
@@ -90,14 +70,14 @@ void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
     char a[32], b[32];
     uint64_t dropped = points_dropped(m);
     fprintf(out, "%s\n", output);
-    fprintf(out, "  points     %s read, %s kept", grouped(m->point_count + dropped, a), grouped(m->point_count, b));
+    fprintf(out, "  points     %s read, %s kept", cli_grouped(m->point_count + dropped, a), cli_grouped(m->point_count, b));
     if (dropped > 0) print_reasons(out, m);
     fprintf(out, "\n  scans      %" PRIu32 "%s\n", m->source_count, prep_build_left_something_out(r) ? ", and some input left out (see above)" : "");
-    bytes_text(r->payload_bytes, a);
+    cli_bytes_text(r->payload_bytes, a);
     fprintf(out, "  tree       %" PRIu32 " nodes in %" PRIu32 " levels, %s (%.1f bytes a point)\n", r->node_count,
             r->level_count, a, (double)r->payload_bytes / (double)m->point_count);
     fprintf(out, "  position   largest error %.3g, step %.3g\n", m->position_error, m->grid.step);
-    bytes_text(r->scratch_bytes, b);
+    cli_bytes_text(r->scratch_bytes, b);
     fprintf(out, "  memory     %.0f MiB at the peak, scratch space %s\n", (double)r->peak_memory / (1 << 20), b);
     fprintf(out, "  time       %.2f s (", r->total_seconds);
     for (int p = 0; p < PREP_PHASES; p++)
@@ -105,24 +85,11 @@ void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
     fprintf(out, "), %.2f M points/s\n", (double)m->point_count / 1e6 / r->total_seconds);
 }
 
-static json_t *text_json(const char *text)
-{
-    json_t *json = json_string(text);
-    return json != NULL ? json : json_string("(not UTF-8)");
-}
-
-static json_t *triple_json(const double v[3])
-{
-    json_t *array = json_array();
-    for (int a = 0; a < 3; a++) json_array_append_new(array, json_real(v[a]));
-    return array;
-}
-
 static json_t *err_json(const char *name, const mospt_err *err)
 {
     char text[2048];
     mospt_err_text(err, text, sizeof text);
-    return json_pack("{s:o, s:o}", "name", text_json(name), "reason", text_json(text));
+    return json_pack("{s:o, s:o}", "name", cli_text_json(name), "reason", cli_text_json(text));
 }
 
 static json_t *sources_json(const mospt_metadata *m)
@@ -133,13 +100,13 @@ static json_t *sources_json(const mospt_metadata *m)
         json_t *reasons = json_object();
         for (uint32_t r = 0; r < s->reason_count; r++)
             json_object_set_new(reasons, s->drop_reason[r], json_integer((json_int_t)s->drop_count[r]));
-        json_t *json = json_pack("{s:o, s:o, s:o, s:I, s:I, s:o, s:b, s:b}", "name", text_json(s->name), "scan",
-                                 text_json(s->scan), "format", text_json(s->format), "points", (json_int_t)s->points,
+        json_t *json = json_pack("{s:o, s:o, s:o, s:I, s:I, s:o, s:b, s:b}", "name", cli_text_json(s->name), "scan",
+                                 cli_text_json(s->scan), "format", cli_text_json(s->format), "points", (json_int_t)s->points,
                                  "dropped", (json_int_t)s->dropped, "dropped_by_reason", reasons, "rgb", (int)s->has_rgb,
                                  "intensity", (int)s->has_intensity);
         if (s->points > 0)
-            json_object_set_new(json, "bounds", json_pack("{s:o, s:o}", "min", triple_json(s->low), "max", triple_json(s->high)));
-        if (s->damage != NULL) json_object_set_new(json, "damage", text_json(s->damage));
+            json_object_set_new(json, "bounds", json_pack("{s:o, s:o}", "min", cli_triple_json(s->low), "max", cli_triple_json(s->high)));
+        if (s->damage != NULL) json_object_set_new(json, "damage", cli_text_json(s->damage));
         if (s->has_pose) {
             json_t *pose = json_array();
             for (int k = 0; k < 16; k++) json_array_append_new(pose, json_real(s->pose[k]));
@@ -152,14 +119,7 @@ static json_t *sources_json(const mospt_metadata *m)
 
 static json_t *bounds_json(const mospt_metadata *m)
 {
-    return json_pack("{s:o, s:o}", "min", triple_json(m->low), "max", triple_json(m->high));
-}
-
-static void write_json(FILE *out, json_t *json)
-{
-    json_dumpf(json, out, JSON_INDENT(2));
-    fputc('\n', out);
-    json_decref(json);
+    return json_pack("{s:o, s:o}", "min", cli_triple_json(m->low), "max", cli_triple_json(m->high));
 }
 
 void cli_report_build_json(FILE *out, const char *output, const prep_build_result *r)
@@ -169,22 +129,17 @@ void cli_report_build_json(FILE *out, const char *output, const prep_build_resul
     for (uint32_t i = 0; i < r->source.left_out_count; i++)
         json_array_append_new(left_out, err_json(r->source.left_out[i].name, &r->source.left_out[i].err));
     for (size_t i = 0; i < r->files.unknown_count; i++)
-        json_array_append_new(unknown, text_json(r->files.unknown[i].name));
+        json_array_append_new(unknown, cli_text_json(r->files.unknown[i].name));
     for (int p = 0; p < PREP_PHASES; p++)
         json_object_set_new(seconds, prep_phase_name((prep_phase)p), json_real(r->seconds[p]));
     json_object_set_new(seconds, "total", json_real(r->total_seconds));
-    write_json(out, json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}", "output",
-                              text_json(output), "points", (json_int_t)m->point_count, "dropped",
+    cli_write_json(out, json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}", "output",
+                              cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
                               (json_int_t)points_dropped(m), "bounds", bounds_json(m), "sources", sources_json(m),
                               "left_out", left_out, "unknown", unknown, "nodes", (json_int_t)r->node_count, "levels",
                               (json_int_t)r->level_count, "bytes", (json_int_t)r->payload_bytes, "position_error",
                               m->position_error, "step", m->grid.step, "peak_memory", (json_int_t)r->peak_memory,
                               "scratch_bytes", (json_int_t)r->scratch_bytes, "seconds", seconds));
-}
-
-static void print_triple(FILE *out, const double v[3])
-{
-    fprintf(out, "%.3f  %.3f  %.3f", v[0], v[1], v[2]);
 }
 
 static void print_sources(FILE *out, const mospt_metadata *m)
@@ -193,18 +148,18 @@ static void print_sources(FILE *out, const mospt_metadata *m)
     fprintf(out, "  scans      %" PRIu32 "\n", m->source_count);
     for (uint32_t i = 0; i < m->source_count; i++) {
         const mospt_source *s = &m->sources[i];
-        fprintf(out, "    %15s  %s%s%s  (%s%s%s)\n", grouped(s->points, number), s->name, s->scan[0] != '\0' ? " / " : "",
+        fprintf(out, "    %15s  %s%s%s  (%s%s%s)\n", cli_grouped(s->points, number), s->name, s->scan[0] != '\0' ? " / " : "",
                 s->scan, s->format, s->has_rgb ? ", colour" : "", s->has_intensity ? ", intensity" : "");
         if (s->damage != NULL) fprintf(out, "    %15s  damaged: %s\n", "", s->damage);
         for (uint32_t r = 0; r < s->reason_count; r++)
-            fprintf(out, "    %15s  dropped: %s\n", grouped(s->drop_count[r], number), s->drop_reason[r]);
+            fprintf(out, "    %15s  dropped: %s\n", cli_grouped(s->drop_count[r], number), s->drop_reason[r]);
     }
 }
 
 static void print_points(FILE *out, const mospt_metadata *m, const mospt_point_figures *f)
 {
     fprintf(out, "  mean       ");
-    print_triple(out, f->mean);
+    cli_print_triple(out, f->mean);
     if (f->has_rgb) fprintf(out, "\n  mean rgb   %.2f  %.2f  %.2f", f->mean_rgb[0], f->mean_rgb[1], f->mean_rgb[2]);
     fprintf(out, "\n  attribute                      min          max         mean\n");
     for (uint32_t k = 0; k < m->schema.count; k++) {
@@ -220,10 +175,10 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
 {
     const mospt_metadata *m = &d->metadata;
     char a[32], b[32];
-    fprintf(out, "%s\n  points     %s\n  min        ", d->path, grouped(m->point_count, a));
-    print_triple(out, m->low);
+    fprintf(out, "%s\n  points     %s\n  min        ", d->path, cli_grouped(m->point_count, a));
+    cli_print_triple(out, m->low);
     fprintf(out, "\n  max        ");
-    print_triple(out, m->high);
+    cli_print_triple(out, m->high);
     fprintf(out, "\n  size      ");
     for (int k = 0; k < 3; k++) fprintf(out, " %.3f%s", m->high[k] - m->low[k], k < 2 ? " " : "\n");
     fprintf(out, "  grid       step %.6g, root cube %.6g wide, largest position error %.3g\n", m->grid.step,
@@ -246,10 +201,10 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
         fprintf(out, "  (--stats reads every point: means, and the memory of a classic sequential point tree)\n");
         return;
     }
-    bytes_text(spt->classic_bytes, a);
-    bytes_text(spt->mospt_bytes, b);
+    cli_bytes_text(spt->classic_bytes, a);
+    cli_bytes_text(spt->mospt_bytes, b);
     fprintf(out, "  memory     %s here; a classic sequential point tree of these points has ", b);
-    fprintf(out, "%s interior nodes\n             (branching factor %.2f) and takes ", grouped(spt->interior, b), spt->branching);
+    fprintf(out, "%s interior nodes\n             (branching factor %.2f) and takes ", cli_grouped(spt->interior, b), spt->branching);
     fprintf(out, "%s: %.0f %% more\n", a, 100 * ((double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
     if (points != NULL) print_points(out, m, points);
 }
@@ -274,8 +229,8 @@ static json_t *stats_json(const mospt_metadata *m, const mospt_point_figures *f)
                                       components_json(f->attribute_max[k], a->components), "mean",
                                       components_json(f->attribute_mean[k], a->components)));
     }
-    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "min", triple_json(f->low), "max", triple_json(f->high), "mean",
-                     triple_json(f->mean), "mean_rgb", f->has_rgb ? triple_json(f->mean_rgb) : json_null(), "attributes",
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "min", cli_triple_json(f->low), "max", cli_triple_json(f->high), "mean",
+                     cli_triple_json(f->mean), "mean_rgb", f->has_rgb ? cli_triple_json(f->mean_rgb) : json_null(), "attributes",
                      attributes);
 }
 
@@ -294,9 +249,9 @@ void cli_report_info_json(FILE *out, const mospt_dataset *d, const mospt_tree_fi
 {
     const mospt_metadata *m = &d->metadata;
     json_t *json = json_pack(
-        "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:{s:f, s:f, s:i}, s:f, s:i}", "dataset", text_json(d->path), "points",
+        "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:{s:f, s:f, s:i}, s:f, s:i}", "dataset", cli_text_json(d->path), "points",
         (json_int_t)m->point_count, "generation", (json_int_t)m->generation, "bounds", bounds_json(m), "attributes",
-        attributes_json(&m->schema), "sources", sources_json(m), "crs", text_json(m->crs), "grid", "step", m->grid.step,
+        attributes_json(&m->schema), "sources", sources_json(m), "crs", cli_text_json(m->crs), "grid", "step", m->grid.step,
         "cube", m->grid.step * (double)(UINT64_C(1) << m->grid.bits), "bits", (int)m->grid.bits, "position_error",
         m->position_error, "inner_depth", (int)m->inner_depth);
     json_object_set_new(json, "tree",
@@ -313,5 +268,5 @@ void cli_report_info_json(FILE *out, const mospt_dataset *d, const mospt_tree_fi
                                       "branching", spt->branching, "overhead",
                                       (double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
     if (points != NULL) json_object_set_new(json, "stats", stats_json(m, points));
-    write_json(out, json);
+    cli_write_json(out, json);
 }

@@ -1,8 +1,8 @@
 /* cli_report.h - what a job says when it is done: words for people, or JSON. */
 #pragma once
-#include "mospt/check.h"
+#include "cli_each.h"
 #include "mospt/survey.h"
-#include "preprocess/build.h"
+#include "preprocess/inspect.h"
 
 #include <stdio.h>
 
@@ -20,3 +20,10 @@ void cli_report_info(FILE *out, const mospt_dataset *dataset, const mospt_tree_f
                      const mospt_point_figures *points, const mospt_spt_figures *spt);
 void cli_report_info_json(FILE *out, const mospt_dataset *dataset, const mospt_tree_figures *tree,
                           const mospt_point_figures *points, const mospt_spt_figures *spt);
+
+/* scans: [count] of one file */
+void cli_report_scans(FILE *out, const char *path, const prep_inspection *scans, uint32_t count);
+void cli_report_scans_json(FILE *out, const char *path, const prep_inspection *scans, uint32_t count);
+
+void cli_report_each(FILE *out, const cli_each_report *report);
+void cli_report_each_json(FILE *out, const char *output, const cli_each_report *report);

@@ -3,6 +3,7 @@
 #include "cli_progress.h"
 #include "cli_report.h"
 
+#include "mospt/check.h"
 #include "mospt/file.h"
 #include "render/shot.h"
 #include "render/view.h"
@@ -26,6 +27,11 @@ static void ask_to_stop(int number)
 {
     (void)number;
     stop_asked = 1;
+}
+
+static bool should_stop(void)
+{
+    return stop_asked != 0;
 }
 
 static int fail(const mospt_err *err)
@@ -54,16 +60,22 @@ static void on_build_announce(void *context, uint64_t points, uint64_t scratch_b
     if (!progress->quiet) cli_report_announcement(points, scratch_bytes, output_bytes);
 }
 
+static prep_build_options build_options(const cli_options *o, const char *output, cli_progress *progress)
+{
+    return (prep_build_options){
+        .inputs = o->paths, .input_count = o->path_count, .output = output, .temp_dir = o->temp_dir, .force = o->force,
+        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .columns = o->columns,
+        .progress = on_build_progress, .context = progress,
+    };
+}
+
 static int build_to(const cli_options *o, const char *output, bool words, mospt_err *err)
 {
     prep_build_result result;
     cli_progress progress;
     cli_progress_start(&progress, o->quiet);
-    const prep_build_options options = {
-        .inputs = o->paths, .input_count = o->path_count, .output = output, .temp_dir = o->temp_dir, .force = o->force,
-        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .columns = o->columns,
-        .progress = on_build_progress, .announce = on_build_announce, .context = &progress,
-    };
+    prep_build_options options = build_options(o, output, &progress);
+    options.announce = on_build_announce;
     /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit is that of the process.
      * A renderer is better served by the allocator's own ways. */
     mallopt(M_MMAP_THRESHOLD, 64 << 10);
@@ -78,13 +90,75 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
     return code;
 }
 
+static bool on_each(void *context, size_t index, size_t count, const char *name)
+{
+    cli_progress *progress = context;
+    cli_progress_end(progress);
+    if (!progress->quiet) fprintf(stderr, "%zu of %zu: %s\n", index + 1, count, name);
+    cli_progress_start(progress, progress->quiet);
+    return !stop_asked;
+}
+
+static int build_each(const cli_options *o)
+{
+    mospt_err err = {0};
+    cli_each_report report;
+    cli_progress progress;
+    size_t failed = 0, lacking = 0;
+    cli_progress_start(&progress, o->quiet);
+    prep_build_options options = build_options(o, o->output, &progress);
+    mallopt(M_MMAP_THRESHOLD, 64 << 10);
+    bool ok = cli_each(&options, on_each, &report, &err);
+    cli_progress_end(&progress);
+    if (ok && o->json) cli_report_each_json(stdout, o->output, &report);
+    else if (ok) cli_report_each(stdout, &report);
+    for (size_t i = 0; i < report.count; i++) {
+        failed += report.items[i].status == CLI_EACH_FAILED;
+        lacking += report.items[i].status == CLI_EACH_FAILED || report.items[i].status == CLI_EACH_IN_PART;
+    }
+    bool none = failed == report.count;
+    cli_each_fini(&report);
+    if (!ok) return fail(&err);
+    return none ? EXIT_FAILED : lacking > 0 ? EXIT_LEFT_OUT : EXIT_DONE;
+}
+
 static int command_build(const cli_options *o)
 {
     mospt_err err = {0};
     if (o->path_count == 0) return misuse(o->command, "which scans?");
-    if (o->output == NULL) return misuse(o->command, "where to? -o NAME.ipts says it");
+    if (o->output == NULL) return misuse(o->command, o->each ? "where to? -o FOLDER says it" : "where to? -o NAME.ipts says it");
+    if (o->each) return build_each(o);
     int code = build_to(o, o->output, true, &err);
     return code == EXIT_FAILED ? fail(&err) : code;
+}
+
+static bool is_dataset_name(const char *path)
+{
+    size_t n = strlen(path);
+    while (n > 1 && path[n - 1] == '/') n--;
+    return mospt_dataset_exists(path) || (n > 5 && strncmp(path + n - 5, ".ipts", 5) == 0);
+}
+
+static int info_of_scans(const cli_options *o)
+{
+    mospt_err err = {0};
+    const prep_scan_options options = {.columns = o->columns};
+    prep_inspection *scans = malloc(sizeof *scans);
+    uint32_t count = 1;
+    bool ok = scans != NULL && prep_inspect(o->paths[0], 0, &options, o->stats, &scans[0], &err);
+    if (ok && scans[0].info.scan_count > 1) {
+        count = scans[0].info.scan_count;
+        prep_inspection *all = realloc(scans, count * sizeof *scans);
+        ok = all != NULL || mospt_err_nomem(&err, count * sizeof *scans);
+        if (ok) scans = all;
+        for (uint32_t i = 1; ok && i < count; i++) ok = prep_inspect(o->paths[0], i, &options, o->stats, &scans[i], &err);
+    }
+    bool damaged = false;
+    for (uint32_t i = 0; ok && i < count; i++) damaged = damaged || scans[i].damage.code != MOSPT_OK;
+    if (ok && o->json) cli_report_scans_json(stdout, o->paths[0], scans, count);
+    else if (ok) cli_report_scans(stdout, o->paths[0], scans, count);
+    free(scans);
+    return !ok ? fail(&err) : damaged ? EXIT_LEFT_OUT : EXIT_DONE;
 }
 
 static int command_info(const cli_options *o)
@@ -95,7 +169,8 @@ static int command_info(const cli_options *o)
     mospt_point_figures *points = NULL;
     mospt_spt_figures spt;
     int code = EXIT_FAILED;
-    if (o->path_count != 1) return misuse(o->command, "one dataset is wanted");
+    if (o->path_count != 1) return misuse(o->command, "one dataset or scan file is wanted");
+    if (!is_dataset_name(o->paths[0])) return info_of_scans(o);
     if (!mospt_dataset_open(o->paths[0], &dataset, &err)) return fail(&err);
     bool read = o->stats || dataset->metadata.point_count <= INFO_READS_POINTS;
     if (o->stats && (points = malloc(sizeof *points)) == NULL) {
@@ -117,13 +192,6 @@ typedef struct {
     char folder[4096]; /* of a temporary dataset, "" otherwise */
     int code;          /* exit code so far */
 } place;
-
-static bool is_dataset_name(const char *path)
-{
-    size_t n = strlen(path);
-    while (n > 1 && path[n - 1] == '/') n--;
-    return mospt_dataset_exists(path) || (n > 5 && strncmp(path + n - 5, ".ipts", 5) == 0);
-}
 
 static bool make_temporary_folder(const cli_options *o, char folder[4096], mospt_err *err)
 {
@@ -207,9 +275,11 @@ static int command_view(const cli_options *o)
     rend_view_result result = {0};
     if (o->path_count == 0) return misuse(o->command, "of what?");
     const rend_view_options options = {.width = o->width, .height = o->height, .camera = o->camera, .look = o->look,
-                                       .limits = o->limits, .frames = o->frames, .screenshot = o->screenshot};
+                                       .limits = o->limits, .frames = o->frames, .screenshot = o->screenshot,
+                                       .should_stop = should_stop};
     bool ok = place_open(o, o->output, &p, &err) && rend_view(p.dataset, &options, &result, &err);
     if (ok) warn_of_damage(result.damaged_nodes, &result.damage);
+    if (ok && result.no_words.code != MOSPT_OK) fail(&result.no_words); /* the picture was there all the same */
     if (ok && result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     place_close(&p);
     return ok ? p.code : fail(&err);

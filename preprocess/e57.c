@@ -15,8 +15,7 @@ enum {
     SAMPLE_WALK_MAX = 1024 /* packets, at most 64 MiB of a scan */
 };
 
-/* Records without a single bit need no file to hold them; no scanner writes more than one of them.
- */
+/* Records without a single bit need no file to hold them; no scanner writes more than one. */
 enum { EMPTY_RECORDS_MAX = 1 << 20 };
 
 typedef struct {

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 
 /* Slicing by eight: Kounavis and Berry, A Systematic Approach to Building High Performance
- * Software-Based CRC Generators, ISCC 2005. Row k of the table advances a byte past k more bytes.
- */
+ * Software-Based CRC Generators, ISCC 2005. Row k of the table moves a byte past k more of them. */
 static void make_table(uint32_t table[8][256])
 {
     enum { CASTAGNOLI = 0x82f63b78 }; /* the polynomial, reflected */

@@ -82,8 +82,7 @@ static void add_single(prep_e57_points *p, prep_scan *scan, const char *name, in
 }
 
 /* The brightest value of a colour. Declared limits say what the sensor could do, what it did, or
- * nothing true, so they are rounded up to the ranges in use and believed as far as a sample allows.
- */
+ * nothing true, so they are rounded up to ranges in use and believed as far as a sample goes. */
 static double white_of(const prep_e57_field *f, double limit, double rgb_max)
 {
     bool is_float = f->kind == PREP_E57_FLOAT || f->kind == PREP_E57_DOUBLE;

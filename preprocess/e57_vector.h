@@ -81,8 +81,7 @@ static inline void prep_e57_stream_take(prep_e57_stream *stream, uint32_t count)
  * returns  whether there are any */
 bool prep_e57_stream_mark_holes(const prep_e57_stream *stream, uint32_t count, uint8_t *out);
 
-/* Walks from packet to packet without reading what is in them, to sample a scan in several places.
- */
+/* Walks from packet to packet without reading what is in them, to sample a scan in many places. */
 typedef struct {
     uint64_t packet;  /* logical offset */
     uint64_t *before; /* [vector->stream_count], borrowed: bytes of each bytestream in the packets
@@ -93,7 +92,6 @@ typedef struct {
 bool prep_e57_walk_on(prep_e57_walk *walk, prep_e57_vector *vector, uint32_t packets);
 
 /* Puts streams before the first record that is whole from that packet on.
- * returns  false if the packet's pieces are too far apart for that; the streams are as before then
- */
+ * returns  false if the packet's pieces are too far apart; the streams are as before then */
 bool prep_e57_walk_enter(const prep_e57_walk *walk, prep_e57_stream *const *streams,
                          uint32_t count);

@@ -212,7 +212,7 @@ static uint64_t points_below(const prep_pass *p, uint32_t from, uint32_t begin, 
 {
     uint64_t sum = 0;
     for (uint32_t b = begin; b < end; b++) {
-        for (uint32_t j = from; j < p->levels; j++) sum += p->buckets[b].accepted[j].count;
+        for (uint32_t j = from; j < p->levels && j < PREP_PASS_LEVELS_MAX; j++) sum += p->buckets[b].accepted[j].count;
         sum += p->buckets[b].rejected.count;
     }
     return sum;
@@ -266,6 +266,7 @@ static bool write_nodes(prep_pass *p, uint32_t j, const uint32_t corner[3], uint
     uint32_t part = width / OCTANTS;
     uint64_t below[OCTANTS], count = 0;
     uint8_t child_mask = 0;
+    if (j >= p->levels || j >= PREP_PASS_LEVELS_MAX) return true; /* of the next pass */
     for (uint32_t o = 0; o < OCTANTS; o++) {
         below[o] = points_below(p, j + 1, begin + o * part, begin + (o + 1) * part);
         if (below[o] >= p->env->shape->add_threshold) child_mask |= (uint8_t)(1u << o);
@@ -273,7 +274,7 @@ static bool write_nodes(prep_pass *p, uint32_t j, const uint32_t corner[3], uint
     }
     for (uint32_t b = begin; b < begin + width; b++) count += p->buckets[b].accepted[j].count;
     if (!write_node(p, j, corner, begin, width, child_mask, count, err)) return false;
-    for (uint32_t o = 0; j + 1 < p->levels && o < OCTANTS; o++) {
+    for (uint32_t o = 0; o < OCTANTS; o++) {
         uint32_t child[3];
         if (!(child_mask >> o & 1)) continue;
         mospt_cell_child(p->env->shape->grid, corner, p->level + j, o, child);

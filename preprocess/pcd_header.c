@@ -47,15 +47,18 @@ static bool parse_fields(header_draft *d, prep_pcd_header *h, mospt_where at, mo
     d->fields_line = at.place;
     for (char *w = next_word(d, false); w != NULL; w = next_word(d, false)) {
         if (h->field_count == PREP_PCD_FIELDS_MAX)
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d fields", PREP_PCD_FIELDS_MAX);
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d fields",
+                                 PREP_PCD_FIELDS_MAX);
         snprintf(h->field[h->field_count++].name, PREP_PCD_NAME_MAX, "%.63s", w);
     }
     return true;
 }
 
-static bool parse_counts(header_draft *d, uint64_t *out, uint32_t *count, mospt_where at, mospt_err *err)
+static bool parse_counts(header_draft *d, uint64_t *out, uint32_t *count, mospt_where at,
+                         mospt_err *err)
 {
-    for (char *w = next_word(d, false); w != NULL && *count < PREP_PCD_FIELDS_MAX; w = next_word(d, false)) {
+    for (char *w = next_word(d, false); w != NULL && *count < PREP_PCD_FIELDS_MAX;
+         w = next_word(d, false)) {
         if (!parse_count(w, &out[(*count)++]))
             return mospt_err_set(err, MOSPT_EFORMAT, at, "`%.60s` where a count is expected", w);
     }
@@ -66,8 +69,8 @@ static bool parse_total(header_draft *d, uint64_t *out, bool *has, mospt_where a
 {
     const char *w = next_word(d, false);
     *has = parse_count(w, out);
-    return *has ||
-           mospt_err_set(err, MOSPT_EFORMAT, at, "`%.60s` where a count is expected", w != NULL ? w : "");
+    return *has || mospt_err_set(err, MOSPT_EFORMAT, at, "`%.60s` where a count is expected",
+                                 w != NULL ? w : "");
 }
 
 static bool parse_viewpoint(header_draft *d, double out[7], mospt_where at, mospt_err *err)
@@ -90,7 +93,8 @@ static bool parse_encoding(header_draft *d, prep_pcd_header *h, mospt_where at, 
         h->encoding = (prep_pcd_encoding)i;
         return true;
     }
-    return mospt_err_set(err, MOSPT_EFORMAT, at, "PCD data that are `%.60s` are not known", w != NULL ? w : "");
+    return mospt_err_set(err, MOSPT_EFORMAT, at, "PCD data that are `%.60s` are not known",
+                         w != NULL ? w : "");
 }
 
 static bool is_word(const char *word, const char *a)
@@ -99,13 +103,15 @@ static bool is_word(const char *word, const char *a)
 }
 
 /* is_end   out, this was the line in front of the data */
-static bool parse_line(header_draft *d, prep_pcd_header *h, mospt_where at, bool *is_end, mospt_err *err)
+static bool parse_line(header_draft *d, prep_pcd_header *h, mospt_where at, bool *is_end,
+                       mospt_err *err)
 {
     const char *key = next_word(d, true);
     if (key == NULL || *key == '#') return true;
     if (is_word(key, "VERSION")) {
         const char *w = next_word(d, false);
-        snprintf(h->version, sizeof h->version, "%s%.5s", w != NULL && *w == '.' ? "0" : "", w != NULL ? w : "");
+        snprintf(h->version, sizeof h->version, "%s%.5s", w != NULL && *w == '.' ? "0" : "",
+                 w != NULL ? w : "");
     } else if (is_word(key, "FIELDS") || is_word(key, "COLUMNS")) {
         return parse_fields(d, h, at, err);
     } else if (is_word(key, "SIZE")) {
@@ -113,7 +119,8 @@ static bool parse_line(header_draft *d, prep_pcd_header *h, mospt_where at, bool
     } else if (is_word(key, "COUNT")) {
         return parse_counts(d, d->count, &d->count_count, at, err);
     } else if (is_word(key, "TYPE")) {
-        for (char *w = next_word(d, false); w != NULL && d->type_count < PREP_PCD_FIELDS_MAX; w = next_word(d, false))
+        for (char *w = next_word(d, false); w != NULL && d->type_count < PREP_PCD_FIELDS_MAX;
+             w = next_word(d, false))
             d->type[d->type_count++] = w[1] == '\0' ? (char)toupper((unsigned char)*w) : '?';
     } else if (is_word(key, "WIDTH")) {
         return parse_total(d, &d->width, &d->has_width, at, err);
@@ -127,7 +134,8 @@ static bool parse_line(header_draft *d, prep_pcd_header *h, mospt_where at, bool
         *is_end = true;
         return parse_encoding(d, h, at, err);
     } else if (!isalpha((unsigned char)*key)) {
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "not a line of a PCD header, which ends with DATA");
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "not a line of a PCD header, which ends with DATA");
     }
     return true;
 }
@@ -138,8 +146,9 @@ static bool type_of(char type, uint64_t size, mospt_type *out)
         char type;
         uint64_t size;
         mospt_type ours;
-    } types[] = {{'F', 4, MOSPT_F32}, {'F', 8, MOSPT_F64}, {'U', 1, MOSPT_U8},  {'U', 2, MOSPT_U16}, {'U', 4, MOSPT_U32},
-                 {'U', 8, MOSPT_U64}, {'I', 1, MOSPT_I8},  {'I', 2, MOSPT_I16}, {'I', 4, MOSPT_I32}, {'I', 8, MOSPT_I64}};
+    } types[] = {{'F', 4, MOSPT_F32}, {'F', 8, MOSPT_F64}, {'U', 1, MOSPT_U8}, {'U', 2, MOSPT_U16},
+                 {'U', 4, MOSPT_U32}, {'U', 8, MOSPT_U64}, {'I', 1, MOSPT_I8}, {'I', 2, MOSPT_I16},
+                 {'I', 4, MOSPT_I32}, {'I', 8, MOSPT_I64}};
     for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
         if (types[i].type != type || types[i].size != size) continue;
         *out = types[i].ours;
@@ -155,17 +164,21 @@ static bool make_fields(const header_draft *d, prep_pcd_header *h, mospt_where a
     if (n == 0) return mospt_err_set(err, MOSPT_EFORMAT, at, "the PCD header names no FIELDS");
     if ((d->size_count != 0 && d->size_count != n) || (d->type_count != 0 && d->type_count != n) ||
         (d->count_count != 0 && d->count_count != n))
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "%u fields, but %u sizes, %u types and %u counts", n,
-                             d->size_count, d->type_count, d->count_count);
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "%u fields, but %u sizes, %u types and %u counts", n, d->size_count,
+                             d->type_count, d->count_count);
     for (uint32_t i = 0; i < n; i++) {
         prep_pcd_field *f = &h->field[i];
-        uint64_t size = d->size_count > 0 ? d->size[i] : 4, count = d->count_count > 0 ? d->count[i] : 1;
+        uint64_t size = d->size_count > 0 ? d->size[i] : 4,
+                 count = d->count_count > 0 ? d->count[i] : 1;
         char type = d->type_count > 0 ? d->type[i] : 'F';
         if (!type_of(type, size, &f->type))
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "field `%s` is of type %c with %" PRIu64 " bytes", f->name,
+            return mospt_err_set(err, MOSPT_EFORMAT, at,
+                                 "field `%s` is of type %c with %" PRIu64 " bytes", f->name,
                                  type >= ' ' && type < 127 ? type : '?', size);
         if (count > PREP_PCD_RECORD_MAX || h->record_size + size * count > PREP_PCD_RECORD_MAX)
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d bytes per point", PREP_PCD_RECORD_MAX);
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "more than %d bytes per point",
+                                 PREP_PCD_RECORD_MAX);
         f->count = (uint32_t)count;
         f->offset = h->record_size;
         h->record_size += (uint32_t)(size * count);
@@ -195,7 +208,8 @@ static bool parse_lines(prep_lines *lines, header_draft *d, prep_pcd_header *h, 
         h->size = prep_input_tell(lines->input) - (lines->end - lines->begin);
         h->line_count = lines->number;
         if (text == NULL)
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "the file ends inside the PCD header, before DATA");
+            return mospt_err_set(err, MOSPT_EFORMAT, at,
+                                 "the file ends inside the PCD header, before DATA");
         if (h->size > HEADER_MAX || length >= LINE_MAX_SIZE)
             return mospt_err_set(err, MOSPT_EFORMAT, at, "the PCD header does not end");
         memcpy(d->text, text, length);
@@ -211,7 +225,8 @@ bool prep_pcd_header_read(prep_input *input, prep_pcd_header *out, mospt_err *er
     header_draft *draft = calloc(1, sizeof *draft);
     if (draft == NULL) return mospt_err_nomem(err, sizeof *draft);
     *out = (prep_pcd_header){.viewpoint = {[3] = 1}};
-    bool ok = prep_input_seek(input, 0, err) && prep_lines_init(&lines, input, LINE_MAX_SIZE, 0, err);
+    bool ok =
+        prep_input_seek(input, 0, err) && prep_lines_init(&lines, input, LINE_MAX_SIZE, 0, err);
     if (ok) {
         ok = parse_lines(&lines, draft, out, err);
         prep_lines_fini(&lines);

@@ -1,6 +1,6 @@
-/* LZF as liblzf writes it: a code below 32 copies that many bytes and one more from the packed data; any other one copies
- * from what was unpacked before, its upper 3 bits being the length (7: another byte is added) less 2, the rest and one more
- * byte the distance less 1. */
+/* LZF as liblzf writes it: a code below 32 copies that many bytes and one more from the packed
+ * data; any other one copies from what was unpacked before, its upper 3 bits being the length (7:
+ * another byte is added) less 2, the rest and one more byte the distance less 1. */
 #include "preprocess/pcd.h"
 
 #include <stdlib.h>
@@ -12,7 +12,8 @@ enum {
     SLACK = 64,    /* copies are done in steps that may go beyond */
 };
 
-bool prep_pcd_lzf_init(prep_pcd_lzf *z, prep_input *input, uint64_t offset, uint64_t size, size_t piece, mospt_err *err)
+bool prep_pcd_lzf_init(prep_pcd_lzf *z, prep_input *input, uint64_t offset, uint64_t size,
+                       size_t piece, mospt_err *err)
 {
     *z = (prep_pcd_lzf){.input = input, .offset = offset, .size = size};
     z->capacity = PREP_PCD_LZF_REACH + 2 * piece;
@@ -36,7 +37,8 @@ static bool refill(prep_pcd_lzf *z, mospt_err *err)
     uint64_t at = z->taken + kept, left = z->size - at;
     size_t want = left < PACKED_SIZE - kept ? (size_t)left : PACKED_SIZE - kept;
     memmove(z->packed, z->packed + z->packed_begin, kept);
-    if (!prep_input_read_at(z->input, z->offset + at, z->packed + kept, want, &got, err)) return false;
+    if (!prep_input_read_at(z->input, z->offset + at, z->packed + kept, want, &got, err))
+        return false;
     if (got < want) z->size = at + got; /* the file has become shorter */
     z->packed_begin = 0;
     z->packed_end = kept + got;
@@ -49,9 +51,11 @@ static inline void copy_back(uint8_t *out, size_t distance, size_t length)
 {
     const uint8_t *from = out - distance;
     if (distance >= 16) {
-        for (size_t i = 0; i < length; i += 16) memcpy(out + i, from + i, 16);
+        for (size_t i = 0; i < length; i += 16)
+            memcpy(out + i, from + i, 16);
     } else {
-        for (size_t i = 0; i < length; i++) out[i] = from[i];
+        for (size_t i = 0; i < length; i++)
+            out[i] = from[i];
     }
 }
 

@@ -13,7 +13,7 @@ enum {
     WINDOW_SIZE = 256 * 1024,
     HEADER_SIZE_MAX = 4096,
     HEADER_LINES = 10,
-    COUNT_LINE_MAX = 32,    /* a line that holds one integer and nothing else is not longer */
+    COUNT_LINE_MAX = 32, /* a line that holds one integer and nothing else is not longer */
     CACHE_FILES = 256,
     CACHE_SCANS = 8 * 1024, /* of all files together, about 1.5 MiB */
 };
@@ -55,7 +55,8 @@ static inline bool is_blank(char c)
 
 static bool is_blank_line(const char *p, const char *end)
 {
-    while (p < end && is_blank(*p)) p++;
+    while (p < end && is_blank(*p))
+        p++;
     return p == end;
 }
 
@@ -64,7 +65,8 @@ static bool is_count(const char *p, const char *end, uint64_t *out)
 {
     uint64_t value = 0;
     int digits = 0;
-    while (p < end && is_blank(*p)) p++;
+    while (p < end && is_blank(*p))
+        p++;
     for (; p < end && (unsigned char)(*p - '0') < 10 && digits < 18; p++, digits++)
         value = value * 10 + (uint64_t)(*p - '0');
     if (digits == 0 || !is_blank_line(p, end)) return false;
@@ -76,7 +78,8 @@ static bool is_count(const char *p, const char *end, uint64_t *out)
 static bool parse_numbers(const char *p, const char *end, int count, double *out)
 {
     for (int i = 0; i < count; i++) {
-        while (p < end && is_blank(*p)) p++;
+        while (p < end && is_blank(*p))
+            p++;
         p = prep_number_parse(p, end, &out[i]);
         if (p == NULL || (p < end && !is_blank(*p)) || !isfinite(out[i])) return false;
     }
@@ -96,7 +99,8 @@ static bool parse_header_line(int i, const char *p, const char *end, prep_ptx_sc
  * size     out, bytes and
  * lines    lines that were understood, blank ones included
  * returns  the number of its lines that were understood */
-static int parse_header(const char *text, const char *end, prep_ptx_scan *out, size_t *size, uint64_t *lines)
+static int parse_header(const char *text, const char *end, prep_ptx_scan *out, size_t *size,
+                        uint64_t *lines)
 {
     int done = 0;
     const char *p = text;
@@ -138,10 +142,12 @@ static void consume(walk *w, size_t size, uint64_t lines)
 static bool refuse(const walk *w, int understood, uint64_t lines, mospt_err *err)
 {
     static const char *const meaning[HEADER_LINES] = {
-        "the number of columns",    "the number of rows",       "the scanner's position",   "the scanner's x axis",
-        "the scanner's y axis",     "the scanner's z axis",     "a row of the matrix",      "a row of the matrix",
-        "a row of the matrix",      "a row of the matrix"};
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(prep_input_path(w->input), w->number + lines + 1),
+        "the number of columns", "the number of rows",   "the scanner's position",
+        "the scanner's x axis",  "the scanner's y axis", "the scanner's z axis",
+        "a row of the matrix",   "a row of the matrix",  "a row of the matrix",
+        "a row of the matrix"};
+    return mospt_err_set(err, MOSPT_EFORMAT,
+                         mospt_at_line(prep_input_path(w->input), w->number + lines + 1),
                          "not the header of a PTX scan: %s expected here", meaning[understood]);
 }
 
@@ -175,10 +181,8 @@ static bool take_line(walk *w, scan_list *list, const char *end, mospt_err *err)
     if (w->in_long_line || is_blank_line(p, end)) return true;
     if (list->count == 0) return refuse(w, 0, 0, err);
     prep_ptx_scan *last = &list->scans[list->count - 1];
-    if (last->lost_line > 0)
-        last->lost_count++;
-    else
-        last->line_count++;
+    if (last->lost_line > 0) last->lost_count++;
+    else last->line_count++;
     return true;
 }
 
@@ -234,11 +238,14 @@ static bool drop_empty(walk *w, scan_list *list, mospt_err *err)
         if (s->line_count > 0 || s->lost_line > 0 || is_declared) list->scans[kept++] = *s;
     }
     if (list->count == 0)
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path), "no PTX file: nothing but blank lines");
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path),
+                             "no PTX file: nothing but blank lines");
     if (!has_lines && declares)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(path, w->number),
                              "the file ends before the first point of a scan");
-    if (!has_lines) return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(path), "the PTX file holds no points");
+    if (!has_lines)
+        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(path),
+                             "the PTX file holds no points");
     list->count = kept;
     return true;
 }
@@ -248,17 +255,17 @@ static bool walk_file(prep_input *input, scan_list *out, mospt_err *err)
     scan_list list = {0};
     walk w = {.input = input, .buffer = malloc(WINDOW_SIZE)};
     if (w.buffer == NULL) return mospt_err_nomem(err, WINDOW_SIZE);
-    bool ok = prep_input_seek(input, 0, err) && find_headers(&w, &list, err) && drop_empty(&w, &list, err);
+    bool ok = prep_input_seek(input, 0, err) && find_headers(&w, &list, err) &&
+              drop_empty(&w, &list, err);
     free(w.buffer);
-    if (ok)
-        *out = list;
-    else
-        free(list.scans);
+    if (ok) *out = list;
+    else free(list.scans);
     return ok;
 }
 
-/* The files walked over last. It is shared by all readers and outlives them, unlike anything else here: the scans of a file
- * are opened one by one, by their number, and each of them would have to walk over all that come before. */
+/* The files walked over last. It is shared by all readers and outlives them, unlike anything else
+ * here: the scans of a file are opened one by one, by their number, and each of them would have to
+ * walk over all that come before. */
 typedef struct {
     dev_t device;
     ino_t inode;
@@ -289,14 +296,16 @@ static bool is_same(const file_key *a, const file_key *b)
            a->modified.tv_sec == b->modified.tv_sec && a->modified.tv_nsec == b->modified.tv_nsec;
 }
 
-static void pick(const scan_list *list, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count, bool *has_more)
+static void pick(const scan_list *list, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
+                 bool *has_more)
 {
     if (index < list->count) *out = list->scans[index];
     *scan_count = list->count;
     *has_more = list->has_more;
 }
 
-static bool recall(const file_key *key, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count, bool *has_more)
+static bool recall(const file_key *key, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
+                   bool *has_more)
 {
     bool found = false;
     pthread_mutex_lock(&cache.lock);
@@ -331,7 +340,8 @@ static void remember(const file_key *key, scan_list *list)
         return;
     }
     pthread_mutex_lock(&cache.lock);
-    while (cache.count == CACHE_FILES || cache.scan_count + list->count > CACHE_SCANS) forget_oldest();
+    while (cache.count == CACHE_FILES || cache.scan_count + list->count > CACHE_SCANS)
+        forget_oldest();
     prep_ptx_scan *fitted = realloc(list->scans, list->count * sizeof *fitted);
     if (fitted != NULL) list->scans = fitted;
     cache.entry[cache.count].key = *key;
@@ -340,8 +350,8 @@ static void remember(const file_key *key, scan_list *list)
     pthread_mutex_unlock(&cache.lock);
 }
 
-bool prep_ptx_find(prep_input *input, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count, bool *has_more,
-                   mospt_err *err)
+bool prep_ptx_find(prep_input *input, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
+                   bool *has_more, mospt_err *err)
 {
     file_key key;
     bool has_key = make_key(prep_input_path(input), &key);
@@ -349,9 +359,7 @@ bool prep_ptx_find(prep_input *input, uint32_t index, prep_ptx_scan *out, uint32
     scan_list list;
     if (!walk_file(input, &list, err)) return false;
     pick(&list, index, out, scan_count, has_more);
-    if (has_key)
-        remember(&key, &list);
-    else
-        free(list.scans);
+    if (has_key) remember(&key, &list);
+    else free(list.scans);
     return true;
 }

@@ -1,7 +1,10 @@
 #include "preprocess/scan.h"
 
+#include "preprocess/e57.h"
 #include "preprocess/las.h"
+#include "preprocess/pcd.h"
 #include "preprocess/ply.h"
+#include "preprocess/ptx.h"
 #include "preprocess/scan_format.h"
 #include "preprocess/text.h"
 
@@ -167,11 +170,14 @@ static bool choose_format(prep_scan *scan, mospt_err *err)
         scan->format = &prep_text_format;
         return true;
     case PREP_FILE_E57:
-        return mospt_err_set(err, MOSPT_EFORMAT, where, "E57 is not read yet");
+        scan->format = &prep_e57_format;
+        return true;
     case PREP_FILE_PCD:
-        return mospt_err_set(err, MOSPT_EFORMAT, where, "PCD is not read yet");
+        scan->format = &prep_pcd_format;
+        return true;
     case PREP_FILE_PTX:
-        return mospt_err_set(err, MOSPT_EFORMAT, where, "PTX is not read yet");
+        scan->format = &prep_ptx_format;
+        return true;
     case PREP_FILE_BINARY:
         break;
     }

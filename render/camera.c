@@ -54,50 +54,121 @@ void rend_camera_axes(const rend_camera *camera, double right[3], double up[3], 
     axes_from(direction, camera->up, right, up, back);
 }
 
-/* The tightest view along a fixed direction: the eye stands where the planes through the outermost
- * corners meet. Done relative to the middle of the box, so that no digit is lost at UTM
- * coordinates. */
+/* A view from a fixed direction on a box, before it is moved to where all that is to be seen fits. */
+typedef struct {
+    double middle[3], half[3];
+    double right[3], up[3], back[3];
+    double tx, ty; /* tangents of half the field of view, less a margin */
+} overview;
+
+static void look_from_above(const double low[3], const double high[3], double aspect,
+                            double fov_rad, overview *out)
+{
+    enum { MARGIN_PERCENT = 4 };
+    double size = 0;
+    for (int a = 0; a < 3; a++) {
+        out->middle[a] = low[a] + 0.5 * (high[a] - low[a]);
+        out->half[a] = 0.5 * (high[a] - low[a]);
+        size = fmax(size, out->half[a]);
+    }
+    if (!(size > 0)) size = fmax(fabs(out->middle[0]), 1) * 1e-6;
+    for (int a = 0; a < 3; a++)
+        out->half[a] = fmax(out->half[a], 1e-3 * size);
+
+    /* 34 degrees down, and a little across, so that two sides of every house show. */
+    double turn = (out->half[1] > 1.3 * out->half[0] ? -160.0 : -110.0) * RAD_PER_DEG,
+           pitch = 34 * RAD_PER_DEG;
+    double direction[3] = {-cos(turn) * cos(pitch), -sin(turn) * cos(pitch), -sin(pitch)};
+    double z_up[3] = {0, 0, 1};
+    axes_from(direction, z_up, out->right, out->up, out->back);
+    out->ty = tan(0.5 * fov_rad) * (1 - 0.01 * MARGIN_PERCENT);
+    out->tx = out->ty * aspect;
+}
+
+/* How far a point, given from the middle of the box, pushes each side of the picture outwards. */
+static void push_sides(const overview *o, const double p[3], double reach[4])
+{
+    double x = dot3(p, o->right), y = dot3(p, o->up), z = dot3(p, o->back);
+    reach[0] = x + o->tx * z, reach[1] = -x + o->tx * z;
+    reach[2] = y + o->ty * z, reach[3] = -y + o->ty * z;
+}
+
+/* The tightest view: the eye stands where the planes through the outermost points meet. All is
+ * relative to the middle of the box, so that no digit is lost at UTM coordinates. */
+static void stand_at(const overview *o, const double reach[4], double fov_rad, rend_camera *out)
+{
+    double ex = 0.5 * (reach[0] - reach[1]), ey = 0.5 * (reach[2] - reach[3]);
+    double ez = fmax((reach[0] + reach[1]) / (2 * o->tx), (reach[2] + reach[3]) / (2 * o->ty));
+    for (int a = 0; a < 3; a++) {
+        double shift = o->right[a] * ex + o->up[a] * ey;
+        out->eye[a] = o->middle[a] + shift + o->back[a] * ez;
+        out->target[a] = o->middle[a] + shift;
+        out->up[a] = a == 2;
+    }
+    out->fov_rad = fov_rad;
+}
+
 void rend_camera_overview(const double low[3], const double high[3], double aspect, double fov_rad,
                           rend_camera *out)
 {
-    enum { MARGIN_PERCENT = 4 };
-    double half[3], size = 0;
-    for (int a = 0; a < 3; a++) {
-        out->target[a] = low[a] + 0.5 * (high[a] - low[a]);
-        half[a] = 0.5 * (high[a] - low[a]);
-        size = fmax(size, half[a]);
-    }
-    if (!(size > 0)) size = fmax(fabs(out->target[0]), 1) * 1e-6;
-    for (int a = 0; a < 3; a++)
-        half[a] = fmax(half[a], 1e-3 * size);
-
-    /* 34 degrees down, and a little across, so that two sides of every house show. */
-    double turn = (half[1] > 1.3 * half[0] ? -160.0 : -110.0) * RAD_PER_DEG,
-           pitch = 34 * RAD_PER_DEG;
-    double direction[3] = {-cos(turn) * cos(pitch), -sin(turn) * cos(pitch), -sin(pitch)};
-    double right[3], up[3], back[3];
-    for (int a = 0; a < 3; a++)
-        out->up[a] = a == 2;
-    axes_from(direction, out->up, right, up, back);
-
-    double ty = tan(0.5 * fov_rad) * (1 - 0.01 * MARGIN_PERCENT), tx = ty * aspect;
+    overview o;
     double reach[4] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    look_from_above(low, high, aspect, fov_rad, &o);
     for (int corner = 0; corner < 8; corner++) {
-        double p[3];
+        double p[3], pushed[4];
         for (int a = 0; a < 3; a++)
-            p[a] = (corner >> a & 1) ? half[a] : -half[a];
-        double x = dot3(p, right), y = dot3(p, up), z = dot3(p, back);
-        reach[0] = fmax(reach[0], x + tx * z), reach[1] = fmax(reach[1], -x + tx * z);
-        reach[2] = fmax(reach[2], y + ty * z), reach[3] = fmax(reach[3], -y + ty * z);
+            p[a] = (corner >> a & 1) ? o.half[a] : -o.half[a];
+        push_sides(&o, p, pushed);
+        for (int side = 0; side < 4; side++)
+            reach[side] = fmax(reach[side], pushed[side]);
     }
-    double ex = 0.5 * (reach[0] - reach[1]), ey = 0.5 * (reach[2] - reach[3]);
-    double ez = fmax((reach[0] + reach[1]) / (2 * tx), (reach[2] + reach[3]) / (2 * ty));
-    for (int a = 0; a < 3; a++) {
-        double shift = right[a] * ex + up[a] * ey;
-        out->eye[a] = out->target[a] + shift + back[a] * ez;
-        out->target[a] += shift;
+    stand_at(&o, reach, fov_rad, out);
+}
+
+static int compare_reals(const void *a, const void *b)
+{
+    double m = *(const double *)a, n = *(const double *)b;
+    return m < n ? -1 : m > n;
+}
+
+/* A box is mostly empty; what is to fill the picture is the points. Those of the root are spread
+ * over all of the site. One in a thousand may fall outside: they are what strays. */
+static bool fit_to_points(const mospt_dataset *dataset, const double low[3], const double high[3],
+                          double aspect, double fov_rad, rend_camera *out)
+{
+    enum { STRAYS = 1000, FEWEST = 8 };
+    const mospt_grid *grid = &dataset->metadata.grid;
+    uint32_t count = dataset->hierarchy.nodes[0].level_end[dataset->hierarchy.inner_depth], n = 0;
+    mospt_vertex *v = malloc(mospt_dataset_vertices_size(dataset, 0));
+    double *pushed = malloc(4 * (size_t)count * sizeof *pushed), reach[4];
+    overview o;
+    bool ok = v != NULL && pushed != NULL && mospt_dataset_read_vertices(dataset, 0, v, NULL);
+    look_from_above(low, high, aspect, fov_rad, &o);
+    for (uint32_t i = 0; ok && i < count; i++) {
+        const uint32_t g[3] = {v[i].x, v[i].y, v[i].z};
+        double p[3], sides[4];
+        bool inside = true;
+        for (int a = 0; a < 3; a++) {
+            p[a] = mospt_grid_axis_to_world(grid, a, g[a]) - o.middle[a];
+            inside = inside && fabs(p[a]) <= o.half[a] + grid->step;
+        }
+        if (!inside) continue;
+        push_sides(&o, p, sides);
+        for (uint32_t side = 0; side < 4; side++)
+            pushed[side * count + n] = sides[side];
+        n++;
     }
-    out->fov_rad = fov_rad;
+    ok = ok && n >= FEWEST;
+    for (uint32_t side = 0; ok && side < 4; side++) {
+        double *of_side = pushed + (size_t)side * count;
+        qsort(of_side, n, sizeof *of_side, compare_reals);
+        reach[side] = of_side[n - 1 - n / STRAYS];
+    }
+    /* Points that all lie on one line of sight fill no picture. */
+    ok = ok && fmax(reach[0] + reach[1], reach[2] + reach[3]) > 1e-3 * fmax(o.half[0], fmax(o.half[1], o.half[2]));
+    if (ok) stand_at(&o, reach, fov_rad, out);
+    free(v), free(pushed);
+    return ok;
 }
 
 enum { BINS = 1024, TRIM_ROUNDS = 12 };
@@ -229,9 +300,10 @@ bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *d
     rend_camera_bounds(dataset, low, high);
     for (int a = 0; a < 3; a++)
         middle[a] = low[a] + 0.5 * (high[a] - low[a]);
-    rend_camera_overview(low, high, (double)width / height,
-                         options->has_fov ? options->fov_deg * RAD_PER_DEG : FOV_DEFAULT_RAD,
-                         &camera);
+    double aspect = (double)width / height;
+    double fov_rad = options->has_fov ? options->fov_deg * RAD_PER_DEG : FOV_DEFAULT_RAD;
+    if (!fit_to_points(dataset, low, high, aspect, fov_rad, &camera))
+        rend_camera_overview(low, high, aspect, fov_rad, &camera);
     override(options, middle, &camera);
     if (camera.eye[0] == camera.target[0] && camera.eye[1] == camera.target[1] &&
         camera.eye[2] == camera.target[2])

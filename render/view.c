@@ -16,6 +16,7 @@
 
 enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
+#define STOP_ASKED_S 0.25 /* between two looks at whether to stop */
 #define MOVING_FRAME_MS 66.0
 #define MOVING_BUDGET_MIN 200000.0
 #define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
@@ -370,7 +371,10 @@ static bool run(viewer *v, mospt_err *err)
 {
     while (!v->quit) {
         rgl_event event;
-        rgl_window_wait(v->window, rest(v));
+        double seconds = rest(v);
+        if (v->options->should_stop != NULL && (seconds < 0 || seconds > STOP_ASKED_S)) seconds = STOP_ASKED_S;
+        rgl_window_wait(v->window, seconds);
+        if (v->options->should_stop != NULL && v->options->should_stop()) v->quit = true;
         while (rgl_window_next(v->window, &event))
             handle(v, &event);
         fly(v);

@@ -12,6 +12,7 @@ typedef struct {
     uint64_t frames; /* quit after so many frames, for scripts and tests; 0: when the user does */
     const char *screenshot; /* of the window, words and all, written before it closes; NULL: none */
     bool help;              /* with the help shown */
+    bool (*should_stop)(void); /* asked a few times a second; true closes the window; NULL: never */
 } rend_view_options;
 
 typedef struct {

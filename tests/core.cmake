@@ -12,7 +12,7 @@ foreach(name
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE core_tools)
     add_test(NAME ${name} COMMAND test_${name})
-    set_tests_properties(${name} PROPERTIES LABELS core TIMEOUT 300)
+    set_tests_properties(${name} PROPERTIES LABELS core TIMEOUT 600)
 endforeach()
 
 # The program itself. It is told where it is.
@@ -20,5 +20,5 @@ if(TARGET instantpoints)
     add_executable(e2e_cli e2e_cli.c)
     target_link_libraries(e2e_cli PRIVATE core_tools PkgConfig::JANSSON)
     add_test(NAME e2e_cli COMMAND e2e_cli $<TARGET_FILE:instantpoints>)
-    set_tests_properties(e2e_cli PROPERTIES LABELS core TIMEOUT 300)
+    set_tests_properties(e2e_cli PROPERTIES LABELS core TIMEOUT 600)
 endif()

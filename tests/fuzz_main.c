@@ -1,7 +1,8 @@
 /* tests/fuzz_main.c - runs a fuzz target without a fuzzing library: random mutations of seed files.
  *
  * Usage: fuzz_FORMAT FOLDER [SECONDS [SEED]]. Takes every file in the folder as a seed, of long
- * ones the beginning, and runs for that many seconds (10). Without the folder the run is skipped. */
+ * ones the beginning, and runs for that many seconds (10). Without the folder the run is skipped.
+ */
 #include <dirent.h>
 #include <stdint.h>
 #include <stdio.h>

@@ -1,11 +1,12 @@
-/* tests/pcl_pcd.cpp - every PCD file of the real scans, read by us and by the Point Cloud Library: the same points.
+/* tests/pcl_pcd.cpp - every PCD file of the real scans, read by us and by the Point Cloud Library:
+ * the same points.
  *
  * Usage: pcl_pcd FOLDER. Files that PCL cannot read are skipped, and it is said why. */
 #include "tests/pcl_ours.h"
 
-#include <pcl/PCLPointCloud2.h>
 #include <pcl/console/print.h>
 #include <pcl/io/pcd_io.h>
+#include <pcl/PCLPointCloud2.h>
 
 #include <algorithm>
 #include <cmath>
@@ -61,11 +62,14 @@ static void leave_out_not_finite(std::vector<double> axes[3])
 {
     size_t kept = 0;
     for (size_t i = 0; i < axes[0].size(); i++) {
-        if (!std::isfinite(axes[0][i]) || !std::isfinite(axes[1][i]) || !std::isfinite(axes[2][i])) continue;
-        for (int a = 0; a < 3; a++) axes[a][kept] = axes[a][i];
+        if (!std::isfinite(axes[0][i]) || !std::isfinite(axes[1][i]) || !std::isfinite(axes[2][i]))
+            continue;
+        for (int a = 0; a < 3; a++)
+            axes[a][kept] = axes[a][i];
         kept++;
     }
-    for (int a = 0; a < 3; a++) axes[a].resize(kept);
+    for (int a = 0; a < 3; a++)
+        axes[a].resize(kept);
 }
 
 static bool read_pcl(const std::string &path, std::vector<double> axes[3], std::string &reason)
@@ -91,38 +95,54 @@ static bool read_pcl(const std::string &path, std::vector<double> axes[3], std::
     }
 }
 
-/* PCL reads ascii into floats, we keep all digits: a step of the last bit of a float is no difference. */
+/* PCL reads ascii into floats, we keep all digits: a step of the last bit of a float is no
+ * difference. */
 static bool is_close(double ours, double theirs)
 {
     return std::fabs(ours - theirs) <= std::fabs(theirs) * 1.2e-7;
 }
 
-static bool compare(const std::vector<double> &ours, const std::vector<double> axes[3], std::string &reason)
+static bool compare(const std::vector<double> &ours, const std::vector<double> axes[3],
+                    std::string &reason)
 {
     if (ours.size() != 3 * axes[0].size()) {
-        reason = std::to_string(ours.size() / 3) + " points, PCL has " + std::to_string(axes[0].size());
+        reason =
+            std::to_string(ours.size() / 3) + " points, PCL has " + std::to_string(axes[0].size());
         return false;
     }
     for (size_t i = 0; i < axes[0].size(); i++) {
         for (int a = 0; a < 3; a++) {
             if (is_close(ours[3 * i + a], axes[a][i])) continue;
-            reason = "point " + std::to_string(i) + " axis " + "xyz"[a] + ": " + std::to_string(ours[3 * i + a]) +
-                     ", PCL has " + std::to_string(axes[a][i]);
+            reason = "point " + std::to_string(i) + " axis " + "xyz"[a] + ": " +
+                     std::to_string(ours[3 * i + a]) + ", PCL has " + std::to_string(axes[a][i]);
             return false;
         }
     }
     return true;
 }
 
+/* Files that PCL reads otherwise, and why we do not follow it. */
+static const char *known_difference(const std::string &file)
+{
+    if (file.find("utm17_comma") != std::string::npos)
+        return "PCL takes no commas between numbers, and reads zeros";
+    return nullptr;
+}
+
 enum verdict { SAME = 0, DIFFERENT = 1, SKIPPED = 2 };
 
-static verdict judge(const std::string &file, bool is_ours, const std::vector<double> &ours, std::string reason)
+static verdict judge(const std::string &file, bool is_ours, const std::vector<double> &ours,
+                     std::string reason)
 {
     std::vector<double> axes[3];
     const std::string name = std::filesystem::path(file).filename().string();
     const std::string our_reason = reason;
     if (!read_pcl(file, axes, reason) || (!is_ours && axes[0].empty())) {
         std::printf("skip %s: %s\n", name.c_str(), reason.c_str());
+        return SKIPPED;
+    }
+    if (is_ours && known_difference(file) != nullptr) {
+        std::printf("skip %s: %s\n", name.c_str(), known_difference(file));
         return SKIPPED;
     }
     if (is_ours && compare(ours, axes, reason)) {
@@ -133,7 +153,8 @@ static verdict judge(const std::string &file, bool is_ours, const std::vector<do
     return DIFFERENT;
 }
 
-/* PCL crashes on some valid files, so it gets a process of its own; ours is read before, where a crash would show. */
+/* PCL crashes on some valid files, so it gets a process of its own; ours is read before, where a
+ * crash would show. */
 static verdict judge_apart(const std::string &file)
 {
     std::vector<double> ours;
@@ -166,7 +187,9 @@ int main(int argc, char **argv)
     }
     std::sort(files.begin(), files.end());
     int count[3] = {0, 0, 0};
-    for (const auto &file : files) count[judge_apart(file)]++;
-    std::printf("%d passed, %d failed, %d skipped\n", count[SAME], count[DIFFERENT], count[SKIPPED]);
+    for (const auto &file : files)
+        count[judge_apart(file)]++;
+    std::printf("%d passed, %d failed, %d skipped\n", count[SAME], count[DIFFERENT],
+                count[SKIPPED]);
     return count[DIFFERENT] > 0 || count[SAME] == 0;
 }

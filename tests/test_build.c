@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { LARGE = 250000 };
+enum { LARGE = 150000 };
 
 static char *folder, *scans, *output;
 

@@ -209,8 +209,9 @@ static void lying_bounds_are_not_believed(void **state)
 {
     (void)state;
     static const char *const lies[] = {
-        "<xMinimum type=\"Float\">50</xMinimum>", "<xMinimum type=\"Float\">-1e30</xMinimum>",
-        "<xMinimum type=\"Float\">500</xMinimum>", "<xMinimum type=\"Float\">nan</xMinimum>", ""};
+        "<xMinimum type=\"Float\">50</xMinimum>",     "<xMinimum type=\"Float\">-1e30</xMinimum>",
+        "<xMinimum type=\"Float\">-90000</xMinimum>", "<xMinimum type=\"Float\">500</xMinimum>",
+        "<xMinimum type=\"Float\">nan</xMinimum>",    ""};
     for (size_t i = 0; i < sizeof lies / sizeof lies[0]; i++) {
         char xml[1024];
         snprintf(xml, sizeof xml,

@@ -308,7 +308,7 @@ static void a_chunk_in_memory_is_decoded_alone(void **state)
         assert_memory_equal(records, records_of(las), COUNT * length);
         assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, (end - begin) / 2, COUNT, records, &got, &err));
         assert_true(got > 0 && (got < COUNT || format > 5)); /* layers of x, y and z may be complete */
-        assert_memory_equal(records, records_of(las), got * 12);
+        for (size_t i = 0; i < got; i++) assert_memory_equal(records + i * length, records_of(las) + i * length, 12);
         assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, 3, COUNT, records, &got, &err));
         assert_int_equal(got, 0);
         free(records);
@@ -466,8 +466,10 @@ static void every_header_byte_may_lie(void **state)
     static const uint8_t values[] = {0, 1, 127, 255};
     for (uint8_t format = 1; format <= 7; format += 6) {
         image las = make_las(format, 120, 1, 5), laz = pack(las, (write_laz_options){.chunk_points = 50});
-        size_t end = prep_le32(laz.bytes + 96) + 8;
+        size_t end = prep_le32(laz.bytes + 96) + 8, record = prep_le16(laz.bytes + 94);
         for (size_t at = 94; at < end; at++) {
+            if (at == 111) at = 247; /* what is between does not matter here */
+            if (at == 255) at = record;
             for (size_t v = 0; v < sizeof values; v++) {
                 uint8_t before = laz.bytes[at];
                 laz.bytes[at] = values[v];

@@ -116,8 +116,8 @@ static void any_way_of_building_gives_the_same_bytes(void **state)
     (void)state;
     for (int kind = 0; kind < CORE_KINDS; kind++) {
         core_site site;
-        core_site_make((core_kind)kind, 16, 6000, (uint64_t)kind, &site);
-        check_all_ways(&site, 1 + (uint32_t)kind % 5, 30, (uint32_t)kind, 101);
+        core_site_make((core_kind)kind, 16, 4000, (uint64_t)kind, &site);
+        check_all_ways(&site, 1 + (uint32_t)kind % 5, 30, (uint32_t)kind, 191);
         core_site_fini(&site);
     }
 }
@@ -146,8 +146,8 @@ static void grids_of_all_widths_give_the_same_bytes(void **state)
     for (size_t k = 0; k < sizeof bits / sizeof bits[0]; k++)
         for (int kind = 0; kind < 3; kind++) {
             core_site site;
-            core_site_make(kinds[kind], bits[k], 2000, k, &site);
-            check_all_ways(&site, 3, 8, (uint32_t)(3 * k) + (uint32_t)kind, 307);
+            core_site_make(kinds[kind], bits[k], 1000, k, &site);
+            check_all_ways(&site, 3, 8, (uint32_t)(37 * k) + (uint32_t)(131 * kind), 500);
             core_site_fini(&site);
         }
 }
@@ -156,7 +156,7 @@ static void deep_trees_of_neighbours_give_the_same_bytes(void **state)
 {
     (void)state;
     core_site site;
-    core_site_make(CORE_LINE, 32, 3000, 1, &site);
+    core_site_make(CORE_LINE, 32, 2000, 1, &site);
     for (uint32_t i = 0; i < site.count; i++) {
         mospt_vertex v = mospt_vertex_of(site.records + i * site.stride);
         v.x = 77 + i % 2, v.y = 5, v.z = 5;
@@ -168,16 +168,16 @@ static void deep_trees_of_neighbours_give_the_same_bytes(void **state)
 
 static void piles_give_the_same_bytes(void **state)
 {
-    static const uint32_t more[] = {99, 100, PREP_PILE_MAX + 100};
+    static const uint32_t more[] = {101, PREP_PILE_MAX + 101}; /* one point is in the node above */
     (void)state;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 2; k++) {
         core_site site;
         core_site_make(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 1, &site);
         const way ways[] = {
             {.levels = 3, .threads = 2, .batch = 65536, .block_size = 1 << 16},
             {.levels = 1, .threads = 1, .batch = 50000, .block_size = 1 << 14, .store_memory = 1 << 20},
         };
-        check_ways(&site, 5, 100, ways, k == 2 ? 2 : 1);
+        check_ways(&site, 5, 100, ways, k == 1 ? 2 : 1);
         core_site_fini(&site);
     }
 }

@@ -20,11 +20,14 @@ static size_t pack(const uint8_t *in, size_t size, uint8_t *out)
     while (at < size) {
         size_t length = 0, from = 0;
         if (at + 3 <= size) {
-            uint32_t key = ((uint32_t)in[at] << 16 | (uint32_t)in[at + 1] << 8 | in[at + 2]) * 2654435761u >> 16;
+            uint32_t key =
+                ((uint32_t)in[at] << 16 | (uint32_t)in[at + 1] << 8 | in[at + 2]) * 2654435761u >>
+                16;
             from = seen[key];
             seen[key] = at + 1;
             if (from > 0 && at - --from <= PREP_PCD_LZF_REACH && from < at) {
-                while (at + length < size && length < PREP_PCD_LZF_STEP && in[from + length] == in[at + length])
+                while (at + length < size && length < PREP_PCD_LZF_STEP &&
+                       in[from + length] == in[at + length])
                     length++;
             }
         }
@@ -91,9 +94,11 @@ static void print(pcd_file *f, const char *format, ...)
     f->size += (size_t)n;
 }
 
-static void add_header(pcd_file *f, prep_pcd_encoding e, const pcd_column *c, uint32_t columns, const char *totals)
+static void add_header(pcd_file *f, prep_pcd_encoding e, const pcd_column *c, uint32_t columns,
+                       const char *totals)
 {
-    static const char letters[MOSPT_TYPE_COUNT] = {'U', 'I', 'U', 'I', 'U', 'I', 'U', 'I', 'F', 'F'};
+    static const char letters[MOSPT_TYPE_COUNT] = {'U', 'I', 'U', 'I', 'U',
+                                                   'I', 'U', 'I', 'F', 'F'};
     print(f, "# .PCD v.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS");
     for (uint32_t k = 0; k < columns; k++)
         print(f, " %s", c[k].name);
@@ -116,10 +121,8 @@ static void add_text(pcd_file *f, const pcd_column *c, uint32_t columns, uint32_
             for (uint32_t n = 0; n < c[k].count; n++) {
                 uint8_t value[8];
                 put_value(&c[k], i, n, value);
-                if (c[k].type == MOSPT_U64)
-                    print(f, "%llu ", (unsigned long long)prep_le64(value));
-                else
-                    print(f, "%.17g ", mospt_type_read(c[k].type, value));
+                if (c[k].type == MOSPT_U64) print(f, "%llu ", (unsigned long long)prep_le64(value));
+                else print(f, "%.17g ", mospt_type_read(c[k].type, value));
             }
         }
         f->bytes[f->size - 1] = '\n';
@@ -127,7 +130,8 @@ static void add_text(pcd_file *f, const pcd_column *c, uint32_t columns, uint32_
 }
 
 /* is_planar    one column after the other, as the compressed data have it */
-static size_t put_data(const pcd_column *c, uint32_t columns, uint32_t points, bool is_planar, uint8_t *out)
+static size_t put_data(const pcd_column *c, uint32_t columns, uint32_t points, bool is_planar,
+                       uint8_t *out)
 {
     size_t at = 0;
     for (uint32_t outer = 0; outer < (is_planar ? columns : points); outer++) {
@@ -146,8 +150,8 @@ static void put32(uint8_t *out, size_t value)
         out[i] = (uint8_t)(value >> 8 * i);
 }
 
-static void make(pcd_file *f, prep_pcd_encoding e, const pcd_column *c, uint32_t columns, uint32_t points,
-                 const char *totals)
+static void make(pcd_file *f, prep_pcd_encoding e, const pcd_column *c, uint32_t columns,
+                 uint32_t points, const char *totals)
 {
     size_t record = 0;
     for (uint32_t k = 0; k < columns; k++)
@@ -173,23 +177,31 @@ static void make(pcd_file *f, prep_pcd_encoding e, const pcd_column *c, uint32_t
 }
 
 /* Everything at once: odd order, all types, several values, padding in between and at the end. */
-static const pcd_column rich[] = {
-    {"z", MOSPT_F64, 1, 300.1, 1, 0},          {"_", MOSPT_U8, 3, 9, 0, 0},
-    {"Intensity", MOSPT_F32, 1, -2048, 500, 0}, {"rgb", MOSPT_U32, 1, 0xff010203, 0x010101, 0},
-    {"ring", MOSPT_U16, 1, 60000, 1, 0},       {"t", MOSPT_U64, 1, 0, 0, 0},
-    {"normal_x", MOSPT_F32, 1, 0.5, 0, 0},     {"normal_z", MOSPT_F32, 1, 0.25, 0, 0},
-    {"normal_y", MOSPT_F32, 1, -1, 0, 0},      {"X", MOSPT_F32, 1, 100.5, 1, 0},
-    {"hist", MOSPT_F32, 5, 1, 10, 0.125},      {"Y", MOSPT_F32, 1, 200.25, 1, 0},
-    {"pair", MOSPT_I8, 2, -100, 1, 50},        {"i16", MOSPT_I16, 1, -30000, 1, 0},
-    {"i32", MOSPT_I32, 1, -2e9, 1, 0},         {"curvature", MOSPT_F64, 1, 0.1, 1, 0},
-    {"_", MOSPT_F32, 1, 7, 0, 0}};
+static const pcd_column rich[] = {{"z", MOSPT_F64, 1, 300.1, 1, 0},
+                                  {"_", MOSPT_U8, 3, 9, 0, 0},
+                                  {"Intensity", MOSPT_F32, 1, -2048, 500, 0},
+                                  {"rgb", MOSPT_U32, 1, 0xff010203, 0x010101, 0},
+                                  {"ring", MOSPT_U16, 1, 60000, 1, 0},
+                                  {"t", MOSPT_U64, 1, 0, 0, 0},
+                                  {"normal_x", MOSPT_F32, 1, 0.5, 0, 0},
+                                  {"normal_z", MOSPT_F32, 1, 0.25, 0, 0},
+                                  {"normal_y", MOSPT_F32, 1, -1, 0, 0},
+                                  {"X", MOSPT_F32, 1, 100.5, 1, 0},
+                                  {"hist", MOSPT_F32, 5, 1, 10, 0.125},
+                                  {"Y", MOSPT_F32, 1, 200.25, 1, 0},
+                                  {"pair", MOSPT_I8, 2, -100, 1, 50},
+                                  {"i16", MOSPT_I16, 1, -30000, 1, 0},
+                                  {"i32", MOSPT_I32, 1, -2e9, 1, 0},
+                                  {"curvature", MOSPT_F64, 1, 0.1, 1, 0},
+                                  {"_", MOSPT_F32, 1, 7, 0, 0}};
 enum { RICH_COLUMNS = sizeof rich / sizeof rich[0] };
 #define RICH_TOTALS "WIDTH 8\nHEIGHT 1\nVIEWPOINT 1 2 3 0 1 0 0\nPOINTS 8"
 
 static void read_bytes(const void *bytes, size_t size, scan_points *out)
 {
     mospt_err err;
-    if (!scan_points_read(scan_points_file("a.pcd", bytes, size), NULL, 3, out, &err)) fail_msg("%s", err.message);
+    if (!scan_points_read(scan_points_file("a.pcd", bytes, size), NULL, 3, out, &err))
+        fail_msg("%s", err.message);
 }
 
 static void read_text(const char *text, scan_points *out)
@@ -202,7 +214,8 @@ static mospt_err refuse_bytes(const void *bytes, size_t size)
     scan_points points;
     mospt_err err = {0};
     const char *path = scan_points_file("a.pcd", bytes, size);
-    if (scan_points_read(path, NULL, 100, &points, &err)) fail_msg("read: %.300s", (const char *)bytes);
+    if (scan_points_read(path, NULL, 100, &points, &err))
+        fail_msg("read: %.300s", (const char *)bytes);
     assert_string_equal(err.file, path);
     assert_true(err.message[0] != '\0');
     return err;
@@ -215,9 +228,10 @@ static mospt_err refuse_text(const char *text)
 
 static void check_rich(const scan_points *p)
 {
-    static const char *const types[][2] = {{"intensity", "f32"}, {"ring", "u16"}, {"t", "u64"},  {"normal", "f32"},
-                                           {"hist", "f32"},      {"pair", "i8"},  {"i16", "i16"}, {"i32", "i32"},
-                                           {"curvature", "f64"}, {"_", ""},       {"rgb", ""},    {"alpha", ""}};
+    static const char *const types[][2] = {
+        {"intensity", "f32"}, {"ring", "u16"}, {"t", "u64"},   {"normal", "f32"},
+        {"hist", "f32"},      {"pair", "i8"},  {"i16", "i16"}, {"i32", "i32"},
+        {"curvature", "f64"}, {"_", ""},       {"rgb", ""},    {"alpha", ""}};
     for (size_t k = 0; k < sizeof types / sizeof types[0]; k++)
         assert_string_equal(scan_points_type(p, types[k][0]), types[k][1]);
     assert_int_equal(p->count, 8);
@@ -225,13 +239,15 @@ static void check_rich(const scan_points *p)
     assert_true(p->info.has_rgb && p->info.has_intensity);
     int t = mospt_schema_find(&p->info.attributes, "t");
     for (uint32_t i = 0; i < 8; i++) {
-        assert_true(p->xyz[3 * i] == 100.5 + i && p->xyz[3 * i + 1] == 200.25 + i && p->xyz[3 * i + 2] == 300.1 + i);
+        assert_true(p->xyz[3 * i] == 100.5 + i && p->xyz[3 * i + 1] == 200.25 + i &&
+                    p->xyz[3 * i + 2] == 300.1 + i);
         for (uint32_t c = 0; c < 3; c++)
             assert_int_equal(p->rgbi[4 * i + c], c + 1 + i);
         assert_true(scan_points_value(p, "intensity", i, 0) == -2048.0 + 500 * i);
         assert_true(scan_points_value(p, "ring", i, 0) == 60000.0 + i);
         assert_true(prep_le64(p->plane[t] + 8 * i) == 1700000000123456789u + i);
-        assert_true(scan_points_value(p, "normal", i, 1) == -1 && scan_points_value(p, "normal", i, 2) == 0.25);
+        assert_true(scan_points_value(p, "normal", i, 1) == -1 &&
+                    scan_points_value(p, "normal", i, 2) == 0.25);
         for (uint32_t c = 0; c < 5; c++)
             assert_true(scan_points_value(p, "hist", i, c) == 1 + 10 * i + 0.125 * c);
         assert_true(scan_points_value(p, "pair", i, 1) == -50.0 + i);
@@ -246,7 +262,8 @@ static void check_rich(const scan_points *p)
 static void all_encodings_give_the_same_points(void **state)
 {
     (void)state;
-    static const char *const names[] = {"PCD 0.7 ascii", "PCD 0.7 binary", "PCD 0.7 binary compressed"};
+    static const char *const names[] = {"PCD 0.7 ascii", "PCD 0.7 binary",
+                                        "PCD 0.7 binary compressed"};
     for (int e = 0; e < 3; e++) {
         pcd_file f;
         scan_points p;
@@ -263,7 +280,8 @@ static void all_encodings_give_the_same_points(void **state)
 static void the_viewpoint_is_kept_but_not_applied(void **state)
 {
     (void)state;
-    static const double pose[16] = {1, 0, 0, 1, 0, -1, 0, 2, 0, 0, -1, 3, 0, 0, 0, 1}; /* half a turn about x */
+    static const double pose[16] = {1, 0, 0,  1, 0, -1, 0, 2,
+                                    0, 0, -1, 3, 0, 0,  0, 1}; /* half a turn about x */
     pcd_file f;
     scan_points p;
     make(&f, PREP_PCD_BINARY, rich, RICH_COLUMNS, 8, RICH_TOTALS);
@@ -274,10 +292,12 @@ static void the_viewpoint_is_kept_but_not_applied(void **state)
     assert_true(p.xyz[1] == 200.25);
     scan_points_fini(&p);
     free(f.bytes);
-    static const char *const none[] = {"0 0 0 1 0 0 0", "0 0 0 0 0 0 0", "nan 0 0 1 0 0 0", "1 2 3 0 0 0 0"};
+    static const char *const none[] = {"0 0 0 1 0 0 0", "0 0 0 0 0 0 0", "nan 0 0 1 0 0 0",
+                                       "1 2 3 0 0 0 0"};
     for (size_t i = 0; i < sizeof none / sizeof none[0]; i++) {
         char text[300];
-        snprintf(text, sizeof text, "VERSION .7\nFIELDS x y z\nVIEWPOINT %s\nPOINTS 1\nDATA ascii\n1 2 3\n", none[i]);
+        snprintf(text, sizeof text,
+                 "VERSION .7\nFIELDS x y z\nVIEWPOINT %s\nPOINTS 1\nDATA ascii\n1 2 3\n", none[i]);
         read_text(text, &p);
         assert_false(p.info.has_pose);
         scan_points_fini(&p);
@@ -288,7 +308,8 @@ static void old_and_sloppy_headers_are_read(void **state)
 {
     (void)state;
     scan_points p;
-    read_text("# .PCD v.5\r\nVERSION .5\r\nCOLUMNS x y z \r\n\r\nSIZE 4 4 4\r\nTYPE F F F\r\nWIDTH 2\r\nHEIGHT 1\r\n"
+    read_text("# .PCD v.5\r\nVERSION .5\r\nCOLUMNS x y z \r\n\r\nSIZE 4 4 4\r\nTYPE F F F\r\nWIDTH "
+              "2\r\nHEIGHT 1\r\n"
               "POINTS 2\r\nDATA ascii\r\n 1, 2,3 \r\n\r\n4\t5 6 7 8\r\n",
               &p);
     assert_int_equal(p.count, 2);
@@ -299,7 +320,8 @@ static void old_and_sloppy_headers_are_read(void **state)
     read_text("VERSION 0.7\nfields X Y Z\nfuture 1 2 3\nWIDTH 2\nDATA ASCII\n1 2 3\n4 5 6", &p);
     assert_int_equal(p.count, 2);
     scan_points_fini(&p);
-    read_text("VERSION .7\nFIELDS x y z _ a _\nSIZE 4 4 4 1 4 1\nTYPE F F F U F U\nCOUNT 1 1 1 2 1 4\nWIDTH 2\n"
+    read_text("VERSION .7\nFIELDS x y z _ a _\nSIZE 4 4 4 1 4 1\nTYPE F F F U F U\nCOUNT 1 1 1 2 1 "
+              "4\nWIDTH 2\n"
               "HEIGHT 1\nPOINTS 2\nDATA ascii\n289814.15 4320978.61 3 0 0 8\n4 5 6 0 0 9 1 2 3 4\n",
               &p);
     assert_int_equal(p.count, 2);
@@ -312,12 +334,16 @@ static void colours_come_in_many_ways(void **state)
 {
     (void)state;
     scan_points p;
-    read_text("VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
-              "DATA ascii\n0.93773 0.33763 0 2.3418052e-38\n", /* the float whose bits are 0x00ff0000 */
-              &p);
+    read_text(
+        "VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT "
+        "1\nPOINTS 1\n"
+        "DATA ascii\n0.93773 0.33763 0 2.3418052e-38\n", /* the float whose bits are 0x00ff0000 */
+        &p);
     assert_true(p.rgbi[0] >= 254 && p.rgbi[1] <= 1);
     scan_points_fini(&p);
-    const pcd_column alpha[] = {{"x", MOSPT_F32, 1, 1, 1, 0}, {"y", MOSPT_F32, 1, 2, 1, 0}, {"z", MOSPT_F32, 1, 3, 1, 0},
+    const pcd_column alpha[] = {{"x", MOSPT_F32, 1, 1, 1, 0},
+                                {"y", MOSPT_F32, 1, 2, 1, 0},
+                                {"z", MOSPT_F32, 1, 3, 1, 0},
                                 {"rgba", MOSPT_U32, 1, 0x80ff0102, 0x01000000, 0}};
     for (int e = 0; e < 3; e++) {
         pcd_file f;
@@ -329,13 +355,15 @@ static void colours_come_in_many_ways(void **state)
         scan_points_fini(&p);
         free(f.bytes);
     }
-    read_text("VERSION .7\nFIELDS x y z r g b\nSIZE 4 4 4 1 1 1\nTYPE F F F U U U\nPOINTS 1\nDATA ascii\n1 2 3 4 5 6\n",
+    read_text("VERSION .7\nFIELDS x y z r g b\nSIZE 4 4 4 1 1 1\nTYPE F F F U U U\nPOINTS 1\nDATA "
+              "ascii\n1 2 3 4 5 6\n",
               &p);
     assert_int_equal(p.rgbi[2], 6);
     scan_points_fini(&p);
-    read_text("VERSION .7\nFIELDS x y z r g b\nSIZE 4 4 4 2 2 2\nTYPE F F F U U U\nPOINTS 1\nDATA ascii\n"
-              "1 2 3 65535 257 0\n",
-              &p);
+    read_text(
+        "VERSION .7\nFIELDS x y z r g b\nSIZE 4 4 4 2 2 2\nTYPE F F F U U U\nPOINTS 1\nDATA ascii\n"
+        "1 2 3 65535 257 0\n",
+        &p);
     assert_int_equal(p.rgbi[1], 1);
     assert_true(scan_points_value(&p, "rgb", 0, 1) == 257);
     scan_points_fini(&p);
@@ -352,9 +380,9 @@ static void colours_come_in_many_ways(void **state)
 static void fields_that_cannot_be_kept_are_named(void **state)
 {
     (void)state;
-    const pcd_column wide[] = {{"x", MOSPT_F32, 1, 1, 1, 0},      {"y", MOSPT_F32, 1, 2, 1, 0},
-                               {"vfh", MOSPT_F32, 308, 5, 1, 1},  {"x", MOSPT_F32, 1, 8, 1, 0},
-                               {"z", MOSPT_F32, 1, 3, 1, 0},      {"none", MOSPT_F32, 0, 0, 0, 0}};
+    const pcd_column wide[] = {{"x", MOSPT_F32, 1, 1, 1, 0},     {"y", MOSPT_F32, 1, 2, 1, 0},
+                               {"vfh", MOSPT_F32, 308, 5, 1, 1}, {"x", MOSPT_F32, 1, 8, 1, 0},
+                               {"z", MOSPT_F32, 1, 3, 1, 0},     {"none", MOSPT_F32, 0, 0, 0, 0}};
     for (int e = 0; e < 3; e++) {
         pcd_file f;
         scan_points p;
@@ -396,11 +424,13 @@ static void what_is_no_pcd_is_refused(void **state)
         "# .PCD v.7\nFIELDS x y z\nPOINTS 2\nDATA binary\n1234",
         "# .PCD v.7\nFIELDS x y z\nPOINTS 2\nDATA binary_compressed\n1234",
         "# .PCD v.7\nFIELDS x y z\nPOINTS 2\nDATA binary_compressed\n12341234",
-        "# .PCD v.7\nFIELDS x y z\nWIDTH 4294967295\nHEIGHT 4294967295\nDATA binary_compressed\n1234123412341234",
+        "# .PCD\nFIELDS x y z\nPOINTS 99999999999\nDATA binary_compressed\n12341234",
+        "# .PCD\nFIELDS x y z\nWIDTH 4294967296\nHEIGHT 4294967296\nDATA ascii\n1 2 3\n",
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         assert_int_equal(refuse_text(texts[i]).code, MOSPT_EFORMAT);
-    assert_int_equal(refuse_text("# .PCD v.7\nFIELDS x y z\nPOINTS 0\nDATA ascii\n").code, MOSPT_EEMPTY);
+    assert_int_equal(refuse_text("# .PCD v.7\nFIELDS x y z\nPOINTS 0\nDATA ascii\n").code,
+                     MOSPT_EEMPTY);
     mospt_err err = refuse_text(texts[2]);
     assert_int_equal(err.place_kind, MOSPT_AT_LINE);
     assert_int_equal(err.place, 5);
@@ -430,7 +460,8 @@ static void bad_lines_are_counted_and_named(void **state)
     assert_int_equal(p.damage.place_kind, MOSPT_AT_LINE);
     assert_int_equal(p.damage.place, 6);
     scan_points_fini(&p);
-    read_text("# .PCD\nFIELDS x y z a\nPOINTS 3\nDATA ascii\n1 2 3 nan\nnan nan nan 0\n7 -inf 9 0\n", &p);
+    read_text(
+        "# .PCD\nFIELDS x y z a\nPOINTS 3\nDATA ascii\n1 2 3 nan\nnan nan nan 0\n7 -inf 9 0\n", &p);
     assert_int_equal(p.count, 1);
     assert_int_equal(p.dropped[PREP_DROP_NOT_FINITE], 2);
     assert_false(p.is_damaged);
@@ -459,7 +490,8 @@ static void a_header_may_lie_about_the_points(void **state)
             make(&f, (prep_pcd_encoding)e, plain, 4, 50, lies[k].totals);
             read_bytes(f.bytes, f.size, &p);
             assert_int_equal(p.count, lies[k].count[e]);
-            assert_int_equal(p.is_damaged, !(k == 1 && e == 1)); /* nothing tells padding from points */
+            assert_int_equal(p.is_damaged,
+                             !(k == 1 && e == 1)); /* nothing tells padding from points */
             assert_true(p.xyz[3 * 48 + 1] == 14 && scan_points_value(&p, "intensity", 48, 0) == 48);
             scan_points_fini(&p);
             free(f.bytes);
@@ -515,7 +547,8 @@ static void compressed_data_that_are_cut_give_whole_points(void **state)
         last = p.count;
         for (uint64_t i = 0; i < p.count; i++) {
             double shown = scan_points_value(&p, "intensity", i, 0);
-            assert_true(p.xyz[3 * i] == 1 + 0.5 * (double)i && p.xyz[3 * i + 1] == 2 + 0.25 * (double)i &&
+            assert_true(p.xyz[3 * i] == 1 + 0.5 * (double)i &&
+                        p.xyz[3 * i + 1] == 2 + 0.25 * (double)i &&
                         p.xyz[3 * i + 2] == 3.0 + (double)i);
             /* an attribute that is cut is zero, in the middle of one some of its bytes are */
             assert_true(shown == (double)i || part < 40);
@@ -556,7 +589,8 @@ static void no_bit_flip_does_harm(void **state)
             make(&f, (prep_pcd_encoding)(round % 3), plain, 4, 40, "WIDTH 40\nHEIGHT 1\nPOINTS 40");
         uint32_t flips = 1 + scan_points_random(&seed) % 4;
         for (uint32_t k = 0; k < flips; k++)
-            f.bytes[scan_points_random(&seed) % f.size] ^= (uint8_t)(1u << scan_points_random(&seed) % 8);
+            f.bytes[scan_points_random(&seed) % f.size] ^=
+                (uint8_t)(1u << scan_points_random(&seed) % 8);
         scan_points_survive("flip.pcd", f.bytes, f.size, NULL);
         free(f.bytes);
     }
@@ -594,7 +628,8 @@ static void a_rewound_scan_reads_the_same(void **state)
         prep_batch batch;
         mospt_err err;
         make(&f, (prep_pcd_encoding)e, plain, 4, 20000, "WIDTH 20000\nHEIGHT 1\nPOINTS 20000");
-        assert_true(prep_scan_open(scan_points_file("a.pcd", f.bytes, f.size), 0, NULL, &scan, &err));
+        assert_true(
+            prep_scan_open(scan_points_file("a.pcd", f.bytes, f.size), 0, NULL, &scan, &err));
         assert_true(prep_batch_init(&batch, &prep_scan_describe(scan)->attributes, 7000, &err));
         for (int i = 0; i < 3; i++) {
             uint64_t count = 0;

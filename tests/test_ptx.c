@@ -98,8 +98,9 @@ static void a_scan_is_read_and_moved_to_the_world(void **state)
     scan_points_fini(&p);
 }
 
-static const char two_scans[] = "2\n2\n" IDENTITY "1 1 1 0.1\n2 2 2 0.2\n3 3 3 0.3\n4 4 4 0.4\n"
-                                "1\n3\n" TURNED "1 0 0 0.1 1 2 3\n0 0 0 0.5 0 0 0\n0 1 0 0.2 4 5 6\n";
+static const char two_scans[] =
+    "2\n2\n" IDENTITY "1 1 1 0.1\n2 2 2 0.2\n3 3 3 0.3\n4 4 4 0.4\n"
+    "1\n3\n" TURNED "1 0 0 0.1 1 2 3\n0 0 0 0.5 0 0 0\n0 1 0 0.2 4 5 6\n";
 
 static void a_file_holds_several_scans(void **state)
 {
@@ -201,7 +202,8 @@ static void bad_lines_are_counted_and_named(void **state)
 {
     (void)state;
     scan_points p;
-    read_text("1\n6\n" IDENTITY "1 2 3 4\nabc def ghi jkl\n1 2\n1 2 3 4 five\nnan 1 2 3\n9 9 9 9\n", &p);
+    read_text("1\n6\n" IDENTITY "1 2 3 4\nabc def ghi jkl\n1 2\n1 2 3 4 five\nnan 1 2 3\n9 9 9 9\n",
+              &p);
     assert_int_equal(p.count, 2);
     assert_int_equal(p.dropped[PREP_DROP_UNREADABLE], 3);
     assert_int_equal(p.dropped[PREP_DROP_NOT_FINITE], 1);
@@ -249,10 +251,11 @@ static void a_scan_that_ends_early_leaves_the_next_one_whole(void **state)
 static void points_behind_a_damaged_header_are_left_out(void **state)
 {
     (void)state;
-    static const char text[] = "1\n1\n" IDENTITY "1 1 1 0.1\n"
-                               "1\n2\n0 0 0\n1 0 0\n0 1 zero\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
-                               "5 5 5 5\n6 6 6 6\n"
-                               "1\n1\n" TURNED "1 0 0 0.1\n";
+    static const char text[] =
+        "1\n1\n" IDENTITY "1 1 1 0.1\n"
+        "1\n2\n0 0 0\n1 0 0\n0 1 zero\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+        "5 5 5 5\n6 6 6 6\n"
+        "1\n1\n" TURNED "1 0 0 0.1\n";
     const char *path = scan_points_file("a.ptx", text, strlen(text));
     one_scan a = read_scan(path, 0), b = read_scan(path, 1);
     assert_int_equal(a.info.scan_count, 2);
@@ -267,7 +270,8 @@ static void matrices_may_be_wrong(void **state)
 {
     (void)state;
     scan_points p;
-    read_text("1\n1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n1 2 3 4\n", &p);
+    read_text("1\n1\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n0 0 0 0\n1 2 3 4\n",
+              &p);
     assert_true(p.xyz[0] == 1 && p.xyz[2] == 3);
     assert_true(p.is_damaged);
     assert_false(p.info.has_pose);

@@ -93,7 +93,6 @@ static const struct {
      MOSPT_OK, 20, true},
     {"ply/heseler__cube-ply-1.0_ascii-comment_renamed_to_remark-invalid.ply",
      "unknown keyword, read leniently", MOSPT_OK, 8, false},
-    {"mutated/A_laz_named.las", "LAZ, which is another reader's", MOSPT_EFORMAT, 0, true},
     {"mutated/A_las_count_4e9.las", "the records that are there", MOSPT_OK, 3000, true},
     {"mutated/A_las_truncated.las", "the records that are there", MOSPT_OK, 2097, true},
     {"mutated/A_ply_truncated.ply", "the vertices that are there", MOSPT_OK, 312, true},
