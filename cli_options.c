@@ -15,8 +15,8 @@ static const struct {
     const char *name, *arguments, *purpose, *details;
 } commands[CLI_COMMANDS] = {
     [CLI_BUILD] = {"build", "SCANS... -o NAME.ipts", "make a dataset of files and folders of scans",
-                   "Reads LAS, PLY and text (.xyz .txt .asc .csv .pts); folders are searched recursively. No point is ever\n"
-                   "lost: what is dropped is counted by reason, what is left out is named.\n"},
+                   "Reads LAS, LAZ, E57, PTX, PTS, PCD, PLY and text (.xyz .txt .asc .csv); folders are searched recursively. No\n"
+                   "point is ever lost: what is dropped is counted by reason, what is left out is named.\n"},
     [CLI_VIEW] = {"view", "NAME.ipts | SCANS...", "look at a dataset, or at raw scans, in a window",
                   "Raw scans are built first, into a temporary dataset or the one that -o names. In the window, F1 shows the keys.\n"},
     [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",

@@ -6,7 +6,12 @@
 #include <stdlib.h>
 
 /* A block stays in the second-level cache while each attribute is picked from it in turn. */
-enum { BLOCK_SIZE = 256 * 1024, SAMPLE_BLOCKS = 64, SAMPLE_RECORDS = 1024, LOOK_SIZE = 1024 * 1024 };
+enum {
+    BLOCK_SIZE = 256 * 1024,
+    SAMPLE_BLOCKS = 64,
+    SAMPLE_RECORDS = 1024,
+    LOOK_SIZE = 1024 * 1024
+};
 
 typedef struct {
     prep_las_header header;
@@ -62,8 +67,8 @@ static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample
     return true;
 }
 
-/* The same of a compressed file, where the first records of a chunk are cheap to have, and others are
- * not. They must be decoded: fewer will do. */
+/* The same of a compressed file, where the first records of a chunk are cheap to have, and others
+ * are not. They must be decoded: fewer will do. */
 static bool take_sample_of_chunks(las_state *las, prep_las_sample *sample, mospt_err *err)
 {
     size_t length = las->header.record_length;

@@ -27,14 +27,15 @@ struct prep_laz {
     prep_laz_chunk *chunk; /* owned; decodes otherwise */
     uint8_t *block;        /* [block_records * record_length], owned */
     size_t block_records;
-    uint32_t place;        /* chunk that is being decoded without other threads */
-    bool is_within;        /* and has been begun with */
+    uint32_t place; /* chunk that is being decoded without other threads */
+    bool is_within; /* and has been begun with */
     bool is_at_end;
     prep_laz_part part;
     size_t part_used; /* records of it that have been delivered */
 };
 
-static bool read_format(prep_input *in, const prep_las_header *h, prep_laz_format *out, mospt_err *err)
+static bool read_format(prep_input *in, const prep_las_header *h, prep_laz_format *out,
+                        mospt_err *err)
 {
     uint64_t at = h->header_size;
     for (uint32_t i = 0; i < h->vlr_count && at + VLR_SIZE <= h->data_offset; i++) {
@@ -44,7 +45,9 @@ static bool read_format(prep_input *in, const prep_las_header *h, prep_laz_forma
         size_t size = prep_le16(p + 20);
         if (got < VLR_SIZE || size > h->data_offset - at - VLR_SIZE) break;
         if (memcmp(p + 2, "laszip encoded", 15) == 0 && prep_le16(p + 18) == LASZIP_RECORD) {
-            if (!prep_input_read_at(in, at + VLR_SIZE, p, size < sizeof p ? size : sizeof p, &got, err)) return false;
+            if (!prep_input_read_at(in, at + VLR_SIZE, p, size < sizeof p ? size : sizeof p, &got,
+                                    err))
+                return false;
             return prep_laz_format_parse(h, prep_input_path(in), p, got, at + VLR_SIZE, out, err);
         }
         at += VLR_SIZE + size;
@@ -62,8 +65,8 @@ static uint32_t choose_threads(uint32_t wanted)
     return wanted < PREP_LAZ_THREADS_MAX ? wanted : PREP_LAZ_THREADS_MAX;
 }
 
-bool prep_laz_open(prep_input *input, const prep_las_header *header, uint32_t threads, prep_laz **out,
-                   mospt_err *err)
+bool prep_laz_open(prep_input *input, const prep_las_header *header, uint32_t threads,
+                   prep_laz **out, mospt_err *err)
 {
     prep_laz *laz = calloc(1, sizeof *laz);
     if (laz == NULL) return mospt_err_nomem(err, sizeof *laz);
@@ -123,8 +126,8 @@ const mospt_err *prep_laz_damage(const prep_laz *laz)
 static void note_damage(prep_laz *laz, uint32_t place, const char *sentence, uint64_t byte)
 {
     if (sentence == NULL || laz->damage.code != MOSPT_OK) return;
-    mospt_err_set(&laz->damage, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(laz->input), byte), "chunk %" PRIu32 ": %s",
-                  place, sentence);
+    mospt_err_set(&laz->damage, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(laz->input), byte),
+                  "chunk %" PRIu32 ": %s", place, sentence);
 }
 
 static bool prepare(prep_laz *laz, mospt_err *err)
@@ -133,7 +136,8 @@ static bool prepare(prep_laz *laz, mospt_err *err)
     laz->place = 0;
     laz->is_within = false;
     if (laz->thread_count > 1 && laz->table.count > 1 && !laz->table.is_open &&
-        !prep_laz_ahead_create(laz->input, &laz->format, &laz->table, laz->thread_count, &laz->ahead, err))
+        !prep_laz_ahead_create(laz->input, &laz->format, &laz->table, laz->thread_count,
+                               &laz->ahead, err))
         return false;
     if (laz->ahead != NULL) return true;
     laz->block_records = (size_t)BLOCK_SIZE / laz->format.record_length;
@@ -154,7 +158,8 @@ static bool end_place(prep_laz *laz, mospt_err *err)
     laz->place++;
     if (laz->place < laz->table.count || !laz->table.is_open || damage != NULL) return true;
     mospt_err failed = {0};
-    if (prep_laz_table_go_on(&laz->table, &laz->format, prep_laz_chunk_end(laz->chunk), &failed)) return true;
+    if (prep_laz_table_go_on(&laz->table, &laz->format, prep_laz_chunk_end(laz->chunk), &failed))
+        return true;
     if (failed.code == MOSPT_OK) return true;
     if (err != NULL) *err = failed;
     return false;
@@ -167,17 +172,19 @@ static bool decode_here(prep_laz *laz, mospt_err *err)
     while (laz->part.count == 0 && laz->place < laz->table.count) {
         const prep_laz_place *p = &laz->table.places[laz->place];
         bool ends_early = laz->table.is_open || laz->format.compressor == PREP_LAZ_ROWS;
-        if (!laz->is_within &&
-            !prep_laz_chunk_begin(laz->chunk, laz->input, p->offset, p->size, p->points, ends_early, err))
+        if (!laz->is_within && !prep_laz_chunk_begin(laz->chunk, laz->input, p->offset, p->size,
+                                                     p->points, ends_early, err))
             return false;
         laz->is_within = true;
-        if (!prep_laz_chunk_read(laz->chunk, laz->block, laz->block_records, &laz->part.count, err)) return false;
+        if (!prep_laz_chunk_read(laz->chunk, laz->block, laz->block_records, &laz->part.count, err))
+            return false;
         if (laz->part.count < laz->block_records && !end_place(laz, err)) return false;
     }
     return true;
 }
 
-bool prep_laz_read(prep_laz *laz, size_t most, const uint8_t **records, size_t *count, mospt_err *err)
+bool prep_laz_read(prep_laz *laz, size_t most, const uint8_t **records, size_t *count,
+                   mospt_err *err)
 {
     *records = NULL;
     *count = 0;
@@ -185,7 +192,8 @@ bool prep_laz_read(prep_laz *laz, size_t most, const uint8_t **records, size_t *
         laz->part_used = 0;
         laz->part.count = 0;
         if (!prepare(laz, err)) return false;
-        if (laz->ahead != NULL ? !prep_laz_ahead_next(laz->ahead, &laz->part, err) : !decode_here(laz, err))
+        if (laz->ahead != NULL ? !prep_laz_ahead_next(laz->ahead, &laz->part, err)
+                               : !decode_here(laz, err))
             return false;
         note_damage(laz, laz->part.place, laz->part.damage, laz->part.damage_byte);
         laz->is_at_end = laz->part.count == 0 && laz->part.damage == NULL;
@@ -213,7 +221,8 @@ uint32_t prep_laz_chunk_count(const prep_laz *laz)
     return laz->table.is_open ? 1 : laz->table.count;
 }
 
-bool prep_laz_look(prep_laz *laz, uint32_t place, uint8_t *records, size_t count, size_t *got, mospt_err *err)
+bool prep_laz_look(prep_laz *laz, uint32_t place, uint8_t *records, size_t count, size_t *got,
+                   mospt_err *err)
 {
     const prep_laz_place *p = &laz->table.places[place];
     prep_laz_chunk *chunk;

@@ -3,9 +3,10 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-/* The bytes belong to the thread that fills them while the slot is not ready, and to the reader while it is. */
+/* The bytes belong to the thread that fills them while the slot is not ready, and to the reader
+ * while it is. */
 typedef struct {
-    uint8_t *bytes;  /* [capacity], owned */
+    uint8_t *bytes; /* [capacity], owned */
     size_t capacity;
     /* Under the lock: */
     bool is_ready, is_last; /* holds a part; the last one of its chunk */
@@ -47,7 +48,8 @@ static bool make_room(slot *s, size_t size, mospt_err *err)
 
 /* Hands a part to the reader, and waits until the slot is free again unless that was the last one.
  * returns  false if there is nothing more to do for this chunk */
-static bool hand_over(prep_laz_ahead *a, slot *s, prep_laz_part part, bool is_last, const mospt_err *failure)
+static bool hand_over(prep_laz_ahead *a, slot *s, prep_laz_part part, bool is_last,
+                      const mospt_err *failure)
 {
     pthread_mutex_lock(&a->lock);
     s->part = part;
@@ -56,7 +58,8 @@ static bool hand_over(prep_laz_ahead *a, slot *s, prep_laz_part part, bool is_la
     if (failure != NULL) s->err = *failure;
     s->is_ready = true;
     pthread_cond_signal(&a->ready);
-    while (!is_last && s->is_ready && !a->stop) pthread_cond_wait(&a->work, &a->lock);
+    while (!is_last && s->is_ready && !a->stop)
+        pthread_cond_wait(&a->work, &a->lock);
     bool goes_on = !is_last && !a->stop;
     pthread_mutex_unlock(&a->lock);
     return goes_on;
@@ -105,17 +108,16 @@ static void *work(void *argument)
     uint32_t place;
     bool ok = prep_laz_chunk_create(&a->format, &chunk, &err);
     while (take_place(a, &place)) {
-        if (ok)
-            decode_place(a, chunk, place);
-        else
-            hand_over(a, slot_of(a, place), (prep_laz_part){.place = place}, true, &err);
+        if (ok) decode_place(a, chunk, place);
+        else hand_over(a, slot_of(a, place), (prep_laz_part){.place = place}, true, &err);
     }
     prep_laz_chunk_destroy(chunk);
     return NULL;
 }
 
-bool prep_laz_ahead_create(prep_input *input, const prep_laz_format *format, const prep_laz_table *table,
-                           uint32_t thread_count, prep_laz_ahead **out, mospt_err *err)
+bool prep_laz_ahead_create(prep_input *input, const prep_laz_format *format,
+                           const prep_laz_table *table, uint32_t thread_count, prep_laz_ahead **out,
+                           mospt_err *err)
 {
     prep_laz_ahead *a = calloc(1, sizeof *a);
     if (a == NULL) return mospt_err_nomem(err, sizeof *a);
@@ -134,7 +136,8 @@ bool prep_laz_ahead_create(prep_input *input, const prep_laz_format *format, con
         return mospt_err_nomem(err, a->slot_count * sizeof(slot));
     }
     /* Fewer threads than asked for are no reason to fail. */
-    while (a->thread_count < thread_count && pthread_create(&a->threads[a->thread_count], NULL, work, a) == 0)
+    while (a->thread_count < thread_count &&
+           pthread_create(&a->threads[a->thread_count], NULL, work, a) == 0)
         a->thread_count++;
     if (a->thread_count == 0) {
         prep_laz_ahead_destroy(a);
@@ -151,17 +154,20 @@ void prep_laz_ahead_destroy(prep_laz_ahead *a)
     a->stop = true;
     pthread_cond_broadcast(&a->work);
     pthread_mutex_unlock(&a->lock);
-    for (uint32_t i = 0; i < a->thread_count; i++) pthread_join(a->threads[i], NULL);
+    for (uint32_t i = 0; i < a->thread_count; i++)
+        pthread_join(a->threads[i], NULL);
     pthread_mutex_destroy(&a->lock);
     pthread_cond_destroy(&a->work);
     pthread_cond_destroy(&a->ready);
-    for (uint32_t i = 0; a->slots != NULL && i < a->slot_count; i++) free(a->slots[i].bytes);
+    for (uint32_t i = 0; a->slots != NULL && i < a->slot_count; i++)
+        free(a->slots[i].bytes);
     free(a->slots);
     free(a->threads);
     free(a);
 }
 
-/* Gives the part that was looked at back to its thread, or its slot to the next chunk. Under the lock. */
+/* Gives the part that was looked at back to its thread, or its slot to the next chunk. Under the
+ * lock. */
 static void release_part(prep_laz_ahead *a)
 {
     slot *s = slot_of(a, a->read);
@@ -180,7 +186,8 @@ bool prep_laz_ahead_next(prep_laz_ahead *a, prep_laz_part *out, mospt_err *err)
         if (a->holds_part) release_part(a);
         if (a->read == a->table->count) break;
         slot *s = slot_of(a, a->read);
-        while (!s->is_ready) pthread_cond_wait(&a->ready, &a->lock);
+        while (!s->is_ready)
+            pthread_cond_wait(&a->ready, &a->lock);
         a->holds_part = true;
         *out = s->part;
         ok = !s->has_failed;

@@ -7,7 +7,7 @@ struct prep_laz_chunk {
     prep_laz_format format;
     prep_laz_rows *rows;     /* owned; one of the two */
     prep_laz_layers *layers; /* owned */
-    uint8_t *first;          /* [record_length], owned: record that opens the chunk, stored as it is */
+    uint8_t *first; /* [record_length], owned: record that opens the chunk, stored as it is */
     uint64_t offset, size;
     uint64_t points, done;
     bool ends_early, has_ended;
@@ -23,10 +23,8 @@ bool prep_laz_chunk_create(const prep_laz_format *format, prep_laz_chunk **out, 
     c->format = *format;
     c->has_ended = true;
     c->first = malloc(format->record_length);
-    if (format->compressor == PREP_LAZ_LAYER_CHUNKS)
-        c->layers = prep_laz_layers_create(format);
-    else
-        c->rows = prep_laz_rows_create(format);
+    if (format->compressor == PREP_LAZ_LAYER_CHUNKS) c->layers = prep_laz_layers_create(format);
+    else c->rows = prep_laz_rows_create(format);
     if (c->first == NULL || (c->layers == NULL && c->rows == NULL)) {
         prep_laz_chunk_destroy(c);
         return mospt_err_nomem(err, 1 << 20);
@@ -51,7 +49,8 @@ static void set_damage(prep_laz_chunk *c, uint64_t byte, const char *sentence)
     c->damage_byte = byte;
 }
 
-static bool begin(prep_laz_chunk *c, prep_laz_source source, uint64_t points, bool ends_early, mospt_err *err)
+static bool begin(prep_laz_chunk *c, prep_laz_source source, uint64_t points, bool ends_early,
+                  mospt_err *err)
 {
     c->offset = source.offset;
     c->size = source.size;
@@ -76,8 +75,8 @@ static bool begin(prep_laz_chunk *c, prep_laz_source source, uint64_t points, bo
     return true;
 }
 
-bool prep_laz_chunk_begin(prep_laz_chunk *c, prep_input *input, uint64_t offset, uint64_t size, uint64_t points,
-                          bool ends_early, mospt_err *err)
+bool prep_laz_chunk_begin(prep_laz_chunk *c, prep_input *input, uint64_t offset, uint64_t size,
+                          uint64_t points, bool ends_early, mospt_err *err)
 {
     prep_laz_source source = {.input = input, .offset = offset, .size = size};
     return begin(c, source, points, ends_early, err);
@@ -94,14 +93,17 @@ static void end(prep_laz_chunk *c)
     if (c->done < c->points)
         set_damage(c, c->offset + c->size, "the chunk ends before its last point");
     else if (c->rows != NULL && !c->ends_early && prep_laz_rows_left(c->rows) > 0)
-        set_damage(c, prep_laz_chunk_end(c), "the chunk is longer than its points, which may be wrong");
+        set_damage(c, prep_laz_chunk_end(c),
+                   "the chunk is longer than its points, which may be wrong");
 }
 
-bool prep_laz_chunk_read(prep_laz_chunk *c, uint8_t *records, size_t count, size_t *got, mospt_err *err)
+bool prep_laz_chunk_read(prep_laz_chunk *c, uint8_t *records, size_t count, size_t *got,
+                         mospt_err *err)
 {
     size_t done = 0;
     if (count > c->points - c->done) count = (size_t)(c->points - c->done);
-    if (!c->has_ended && c->done == 0 && count > 0) memcpy(records, c->first, c->format.record_length), done = 1;
+    if (!c->has_ended && c->done == 0 && count > 0)
+        memcpy(records, c->first, c->format.record_length), done = 1;
     if (!c->has_ended && done < count) {
         uint8_t *rest = records + done * c->format.record_length;
         done += c->layers != NULL ? prep_laz_layers_read(c->layers, rest, count - done)
@@ -128,14 +130,15 @@ uint64_t prep_laz_chunk_end(const prep_laz_chunk *c)
     return c->offset + c->size - (c->rows != NULL ? prep_laz_rows_left(c->rows) : 0);
 }
 
-bool prep_laz_chunk_decode(const prep_laz_format *format, const uint8_t *bytes, size_t size, uint64_t points,
-                           uint8_t *records, uint64_t *got, mospt_err *err)
+bool prep_laz_chunk_decode(const prep_laz_format *format, const uint8_t *bytes, size_t size,
+                           uint64_t points, uint8_t *records, uint64_t *got, mospt_err *err)
 {
     prep_laz_chunk *c;
     size_t n = 0;
     if (!prep_laz_chunk_create(format, &c, err)) return false;
     prep_laz_source source = {.bytes = bytes, .size = size};
-    bool ok = begin(c, source, points, false, err) && prep_laz_chunk_read(c, records, (size_t)points, &n, err);
+    bool ok = begin(c, source, points, false, err) &&
+              prep_laz_chunk_read(c, records, (size_t)points, &n, err);
     *got = n;
     prep_laz_chunk_destroy(c);
     return ok;

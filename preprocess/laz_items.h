@@ -1,8 +1,9 @@
 /* preprocess/laz_items.h - the parts of a compressed record. Internal to the LAZ decoder.
  *
- * "LAZ Specification 1.4", sections on the items. Two families: point formats 0 to 5 are coded record by record (rows), all
- * parts from one stream of bytes; 6 to 10 are coded part by part (layers), each from its own. Both predict every part from
- * the records before it, and share what is below. A state belongs to one chunk: it is cleared where the next one begins. */
+ * "LAZ Specification 1.4", sections on the items. Two families: point formats 0 to 5 are coded
+ * record by record (rows), all parts from one stream of bytes; 6 to 10 are coded part by part
+ * (layers), each from its own. Both predict every part from the records before it, and share what
+ * is below. A state belongs to one chunk: it is cleared where the next one begins. */
 #pragma once
 #include "preprocess/bytes.h"
 #include "preprocess/laz.h"
@@ -19,7 +20,8 @@ enum {
     PREP_LAZ_WAVE_SIZE = 29,
 };
 
-/* The median of the last five values, roughly: of five sorted ones the largest and the smallest give way in turn. */
+/* The median of the last five values, roughly: of five sorted ones the largest and the smallest
+ * give way in turn. */
 typedef struct {
     int32_t sorted[5];
     bool keeps_largest;
@@ -39,7 +41,7 @@ typedef struct {
 /* Models of a colour. Its bytes: red, green, blue, each the low byte first. */
 typedef struct {
     prep_laz_model *changed, *byte[6];
-    prep_laz_integer integer;      /* version 1 only */
+    prep_laz_integer integer; /* version 1 only */
     prep_laz_model *context[6];
 } prep_laz_rgb;
 
@@ -60,7 +62,8 @@ void prep_laz_rgb_init(prep_laz_rgb *rgb);
 void prep_laz_wave_init(prep_laz_wave *wave);
 
 /* Reads the packet that follows `packet` and puts it there. */
-void prep_laz_wave_read(prep_laz_stream *stream, prep_laz_arena *arena, prep_laz_wave *wave, uint8_t *packet);
+void prep_laz_wave_read(prep_laz_stream *stream, prep_laz_arena *arena, prep_laz_wave *wave,
+                        uint8_t *packet);
 
 /* Point formats 0 to 5. */
 typedef struct prep_laz_rows prep_laz_rows;
@@ -68,25 +71,31 @@ prep_laz_rows *prep_laz_rows_create(const prep_laz_format *format); /* NULL: no 
 void prep_laz_rows_destroy(prep_laz_rows *rows);
 /* Takes the first record of a chunk from the source, and prepares for the others.
  * returns  false if the source is too small for it */
-bool prep_laz_rows_begin(prep_laz_rows *rows, prep_laz_source source, uint8_t *first, mospt_err *err);
+bool prep_laz_rows_begin(prep_laz_rows *rows, prep_laz_source source, uint8_t *first,
+                         mospt_err *err);
 /* Reads the following records; fewer than `count` where the bytes end. */
 size_t prep_laz_rows_read(prep_laz_rows *rows, uint8_t *records, size_t count);
-uint64_t prep_laz_rows_left(const prep_laz_rows *rows); /* bytes of the source that were not needed */
+uint64_t
+prep_laz_rows_left(const prep_laz_rows *rows); /* bytes of the source that were not needed */
 
-/* Point formats 6 to 10; the same, but a layer that is damaged leaves the others alone as long as it is neither x, y nor z. */
+/* Point formats 6 to 10; the same, but a layer that is damaged leaves the others alone as long as
+ * it is neither x, y nor z. */
 typedef struct prep_laz_layers prep_laz_layers;
 prep_laz_layers *prep_laz_layers_create(const prep_laz_format *format);
 void prep_laz_layers_destroy(prep_laz_layers *layers);
 /* errors   MOSPT_ENOMEM, MOSPT_EIO in `err`; its code is left alone if the source is too small */
-bool prep_laz_layers_begin(prep_laz_layers *layers, prep_laz_source source, uint8_t *first, mospt_err *err);
+bool prep_laz_layers_begin(prep_laz_layers *layers, prep_laz_source source, uint8_t *first,
+                           mospt_err *err);
 size_t prep_laz_layers_read(prep_laz_layers *layers, uint8_t *records, size_t count);
-uint32_t prep_laz_layers_count(const prep_laz_layers *layers); /* points, as the chunk itself says */
-/* Reads the head of the chunk at the start of the source: its points, and its size, whether or not the source has them.
- * returns  false if the source is too small, or if reading failed, which alone sets err->code */
-bool prep_laz_layers_measure(const prep_laz_format *format, prep_laz_source source, uint32_t *points, uint64_t *size,
-                             mospt_err *err);
-/* A layer that ended too early or was not used up; NULL if there is none. Ask at the end of the chunk.
- * byte     out, where it begins */
+uint32_t
+prep_laz_layers_count(const prep_laz_layers *layers); /* points, as the chunk itself says */
+/* Reads the head of the chunk at the start of the source: its points, and its size, whether or not
+ * the source has them. returns  false if the source is too small, or if reading failed, which alone
+ * sets err->code */
+bool prep_laz_layers_measure(const prep_laz_format *format, prep_laz_source source,
+                             uint32_t *points, uint64_t *size, mospt_err *err);
+/* A layer that ended too early or was not used up; NULL if there is none. Ask at the end of the
+ * chunk. byte     out, where it begins */
 const char *prep_laz_layers_damage(const prep_laz_layers *layers, uint64_t *byte);
 
 static inline void prep_laz_put16(uint8_t *p, uint32_t v)
@@ -127,7 +136,8 @@ static inline int32_t prep_laz_greater(int32_t a, int32_t b)
 /* Sorts a value in. The side that a value joins loses its end the next time. */
 static inline void prep_laz_median_add(prep_laz_median *m, int32_t v)
 {
-    const int32_t a = m->sorted[0], b = m->sorted[1], c = m->sorted[2], d = m->sorted[3], e = m->sorted[4];
+    const int32_t a = m->sorted[0], b = m->sorted[1], c = m->sorted[2], d = m->sorted[3],
+                  e = m->sorted[4];
     if (!m->keeps_largest) {
         m->sorted[0] = prep_laz_lesser(a, v);
         m->sorted[1] = prep_laz_greater(a, prep_laz_lesser(b, v));
@@ -153,17 +163,19 @@ static inline void prep_laz_gps_doubt(prep_laz_gps *g, uint32_t i, uint32_t delt
     g->extremes[i] = 0;
 }
 
-/* The next time is some multiple of the step away; `code` says which: 0 to 500, or -1 to -10 as 501 to 510. */
-PREP_LAZ_INLINE void prep_laz_gps_multiple(prep_laz_range *r, prep_laz_arena *arena, prep_laz_gps *g, uint32_t code)
+/* The next time is some multiple of the step away; `code` says which: 0 to 500, or -1 to -10 as 501
+ * to 510. */
+PREP_LAZ_INLINE void prep_laz_gps_multiple(prep_laz_range *r, prep_laz_arena *arena,
+                                           prep_laz_gps *g, uint32_t code)
 {
     enum { MOST = 500, LEAST_CODE = 510 };
     uint32_t i = g->current;
     int32_t times = code <= MOST ? (int32_t)code : MOST - (int32_t)code;
-    uint32_t context = code == 1     ? 1
-                       : code == 0    ? 7
-                       : code < 10    ? 2
-                       : code < MOST  ? 3
-                       : code == MOST ? 4
+    uint32_t context = code == 1           ? 1
+                       : code == 0         ? 7
+                       : code < 10         ? 2
+                       : code < MOST       ? 3
+                       : code == MOST      ? 4
                        : code < LEAST_CODE ? 5
                                            : 6;
     uint32_t prediction = (uint32_t)times * (uint32_t)g->step[i];
@@ -186,7 +198,8 @@ PREP_LAZ_INLINE void prep_laz_gps_far(prep_laz_range *r, prep_laz_arena *arena, 
 
 /* Reads the time that follows g->time[g->current]. Versions 2 and 3.
  * has_same   the codes include one for a time that is the same as before (version 2) */
-PREP_LAZ_INLINE void prep_laz_gps_read(prep_laz_range *r, prep_laz_arena *arena, prep_laz_gps *g, bool has_same)
+PREP_LAZ_INLINE void prep_laz_gps_read(prep_laz_range *r, prep_laz_arena *arena, prep_laz_gps *g,
+                                       bool has_same)
 {
     enum { FAR_CODE = 511 };
     for (uint32_t hop = 0; hop < PREP_LAZ_GPS_HOPS; hop++) {
@@ -224,15 +237,17 @@ static inline uint32_t prep_laz_clamp_8(int32_t v)
     return v < 0 ? 0 : v > 255 ? 255 : (uint32_t)v;
 }
 
-PREP_LAZ_INLINE uint32_t prep_laz_byte_read(prep_laz_range *r, prep_laz_arena *arena, prep_laz_model **model,
-                                           uint32_t last)
+PREP_LAZ_INLINE uint32_t prep_laz_byte_read(prep_laz_range *r, prep_laz_arena *arena,
+                                            prep_laz_model **model, uint32_t last)
 {
     return (last + prep_laz_range_symbol(r, prep_laz_model_at(model, arena, 256))) & 255;
 }
 
-/* Low bytes (at = 0) or high bytes (at = 1) of green and blue: green moves as red did, blue as both did on average. */
-PREP_LAZ_INLINE void prep_laz_rgb_follow(prep_laz_range *r, prep_laz_arena *arena, prep_laz_rgb *rgb, uint8_t *last,
-                                        uint32_t red, uint32_t changed, uint32_t at)
+/* Low bytes (at = 0) or high bytes (at = 1) of green and blue: green moves as red did, blue as both
+ * did on average. */
+PREP_LAZ_INLINE void prep_laz_rgb_follow(prep_laz_range *r, prep_laz_arena *arena,
+                                         prep_laz_rgb *rgb, uint8_t *last, uint32_t red,
+                                         uint32_t changed, uint32_t at)
 {
     int32_t move = (int32_t)red - last[at];
     if (changed >> (2 + at) & 1) {
@@ -251,7 +266,8 @@ PREP_LAZ_INLINE void prep_laz_rgb_follow(prep_laz_range *r, prep_laz_arena *aren
 }
 
 /* Reads the colour that follows `last` and puts it there. Versions 2 and 3. */
-PREP_LAZ_INLINE void prep_laz_rgb_read(prep_laz_range *r, prep_laz_arena *arena, prep_laz_rgb *rgb, uint8_t *last)
+PREP_LAZ_INLINE void prep_laz_rgb_read(prep_laz_range *r, prep_laz_arena *arena, prep_laz_rgb *rgb,
+                                       uint8_t *last)
 {
     uint32_t changed = prep_laz_range_symbol(r, prep_laz_model_at(&rgb->changed, arena, 128));
     uint32_t low = last[0], high = last[1];

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A block of points is decoded layer after layer, so that each keeps its decoder in registers; the first layer leaves a
- * note for each point that tells the others in which context they are. */
+/* A block of points is decoded layer after layer, so that each keeps its decoder in registers; the
+ * first layer leaves a note for each point that tells the others in which context they are. */
 enum {
     BLOCK = 512,
     CHANNELS = 4,
@@ -15,41 +15,72 @@ enum {
 };
 
 typedef enum {
-    LAYER_XY, LAYER_Z, LAYER_CLASSIFICATION, LAYER_FLAGS, LAYER_INTENSITY, LAYER_ANGLE, LAYER_USER, LAYER_SOURCE,
-    LAYER_GPS, LAYER_RGB, LAYER_NIR, LAYER_WAVE, LAYER_BYTE, /* and those of the other extra bytes */
+    LAYER_XY,
+    LAYER_Z,
+    LAYER_CLASSIFICATION,
+    LAYER_FLAGS,
+    LAYER_INTENSITY,
+    LAYER_ANGLE,
+    LAYER_USER,
+    LAYER_SOURCE,
+    LAYER_GPS,
+    LAYER_RGB,
+    LAYER_NIR,
+    LAYER_WAVE,
+    LAYER_BYTE, /* and those of the other extra bytes */
 } layer_kind;
 
 static const char *const layer_damage[LAYER_BYTE + 1] = {
-    "the layer of x and y does not end where it should", "the layer of z does not end where it should",
-    "the layer of classifications does not end where it should", "the layer of flags does not end where it should",
-    "the layer of intensities does not end where it should", "the layer of scan angles does not end where it should",
-    "the layer of user data does not end where it should", "the layer of point sources does not end where it should",
-    "the layer of GPS times does not end where it should", "the layer of colours does not end where it should",
-    "the layer of near infrared does not end where it should", "the layer of wave packets does not end where it should",
+    "the layer of x and y does not end where it should",
+    "the layer of z does not end where it should",
+    "the layer of classifications does not end where it should",
+    "the layer of flags does not end where it should",
+    "the layer of intensities does not end where it should",
+    "the layer of scan angles does not end where it should",
+    "the layer of user data does not end where it should",
+    "the layer of point sources does not end where it should",
+    "the layer of GPS times does not end where it should",
+    "the layer of colours does not end where it should",
+    "the layer of near infrared does not end where it should",
+    "the layer of wave packets does not end where it should",
     "a layer of extra bytes does not end where it should",
 };
 
 static const uint8_t layer_need[LAYER_BYTE + 1] = {
-    4 * PREP_LAZ_STEP_MAX + 2 * PREP_LAZ_INTEGER_MAX, PREP_LAZ_INTEGER_MAX, PREP_LAZ_STEP_MAX, PREP_LAZ_STEP_MAX,
-    PREP_LAZ_INTEGER_MAX, PREP_LAZ_INTEGER_MAX, PREP_LAZ_STEP_MAX, PREP_LAZ_INTEGER_MAX,
-    PREP_LAZ_GPS_NEED, PREP_LAZ_RGB_NEED, 3 * PREP_LAZ_STEP_MAX, PREP_LAZ_WAVE_NEED, PREP_LAZ_STEP_MAX,
+    4 * PREP_LAZ_STEP_MAX + 2 * PREP_LAZ_INTEGER_MAX,
+    PREP_LAZ_INTEGER_MAX,
+    PREP_LAZ_STEP_MAX,
+    PREP_LAZ_STEP_MAX,
+    PREP_LAZ_INTEGER_MAX,
+    PREP_LAZ_INTEGER_MAX,
+    PREP_LAZ_STEP_MAX,
+    PREP_LAZ_INTEGER_MAX,
+    PREP_LAZ_GPS_NEED,
+    PREP_LAZ_RGB_NEED,
+    3 * PREP_LAZ_STEP_MAX,
+    PREP_LAZ_WAVE_NEED,
+    PREP_LAZ_STEP_MAX,
 };
 
-/* One of six contexts per combination of return number (columns) and number of returns (rows), as digits. */
+/* One of six contexts per combination of return number (columns) and number of returns (rows), as
+ * digits. */
 static const char return_context[16][17] = {
-    "0123453445555555", "1013333333333333", "2124444444433333", "3345444444444444", "4344544444444444", "5344454444444444",
-    "3344445444444444", "4344444544444444", "4344444454444444", "5344444445444444", "5344444444544444", "5334444444455444",
+    "0123453445555555", "1013333333333333", "2124444444433333", "3345444444444444",
+    "4344544444444444", "5344454444444444", "3344445444444444", "4344444544444444",
+    "4344444454444444", "5344444445444444", "5344444444544444", "5334444444455444",
     "5334444444455544", "5334444444445554", "5334444444444555", "5334444444444455",
 };
 
 /* What the other layers need to know of a point. */
 typedef struct {
-    uint8_t channel;     /* whose context it is in */
-    uint8_t from;        /* the channel that this one takes over from at its first point; NOBODY: it is known */
-    uint8_t item, item_last, item_from; /* the same for the layers of colours, packets and extra bytes: whose models, whose
-                                           last value, and where that comes from */
-    uint8_t ends;        /* first return of its pulse: 1, last: 2 */
-    uint8_t level;       /* returns of the pulse that are missing, at most 7 */
+    uint8_t channel; /* whose context it is in */
+    uint8_t from;    /* the channel that this one takes over from at its first point; NOBODY: it is
+                        known */
+    uint8_t item, item_last,
+        item_from; /* the same for the layers of colours, packets and extra bytes: whose models,
+                      whose last value, and where that comes from */
+    uint8_t ends;  /* first return of its pulse: 1, last: 2 */
+    uint8_t level; /* returns of the pulse that are missing, at most 7 */
     uint8_t z_context;
     bool has_new_time, has_new_angle, has_new_source;
 } note;
@@ -79,7 +110,8 @@ typedef struct {
     prep_laz_rgb rgb;
     prep_laz_model *nir_changed, *nir_byte[2];
     prep_laz_wave wave;
-    uint8_t *last;                /* [record_length], in `lasts`: colour, packet and extra bytes of the last record */
+    uint8_t
+        *last; /* [record_length], in `lasts`: colour, packet and extra bytes of the last record */
     prep_laz_model **extra_model; /* [extra_size], in `extra_models` */
 } channel_state;
 
@@ -96,10 +128,10 @@ struct prep_laz_layers {
     uint8_t *windows; /* [windows_size], owned */
     size_t windows_size;
     uint32_t layer_count, points;
-    layer *layers;                  /* [layer_count], owned */
-    uint8_t *sizes;                 /* [4 * (layer_count + 1)], owned */
-    uint8_t *lasts;                 /* [CHANNELS * record_length], owned */
-    prep_laz_model **extra_models;  /* [CHANNELS * extra_size], owned */
+    layer *layers;                 /* [layer_count], owned */
+    uint8_t *sizes;                /* [4 * (layer_count + 1)], owned */
+    uint8_t *lasts;                /* [CHANNELS * record_length], owned */
+    prep_laz_model **extra_models; /* [CHANNELS * extra_size], owned */
     uint32_t channel;
     uint32_t known, item_known; /* bit per channel */
     uint32_t item;
@@ -109,10 +141,14 @@ struct prep_laz_layers {
 
 static size_t arena_size(const prep_laz_format *f)
 {
-    size_t size = 8 * prep_laz_model_size(128) + prep_laz_model_size(3) + 32 * prep_laz_model_size(16);
-    size += prep_laz_model_size(13) + (2 * 64) * prep_laz_model_size(256) + 64 * prep_laz_model_size(64);
-    size += prep_laz_integer_size(32, 2) + prep_laz_integer_size(32, 22) + prep_laz_integer_size(32, 20);
-    size += prep_laz_integer_size(16, 4) + prep_laz_integer_size(16, 2) + prep_laz_integer_size(16, 1);
+    size_t size =
+        8 * prep_laz_model_size(128) + prep_laz_model_size(3) + 32 * prep_laz_model_size(16);
+    size += prep_laz_model_size(13) + (2 * 64) * prep_laz_model_size(256) +
+            64 * prep_laz_model_size(64);
+    size += prep_laz_integer_size(32, 2) + prep_laz_integer_size(32, 22) +
+            prep_laz_integer_size(32, 20);
+    size +=
+        prep_laz_integer_size(16, 4) + prep_laz_integer_size(16, 2) + prep_laz_integer_size(16, 1);
     size += prep_laz_gps_size();
     if (f->rgb_at != 0) size += prep_laz_rgb_size();
     if (f->nir_at != 0) size += prep_laz_model_size(4) + 2 * prep_laz_model_size(256);
@@ -151,7 +187,8 @@ prep_laz_layers *prep_laz_layers_create(const prep_laz_format *format)
     s->extra_models = calloc(CHANNELS * (size_t)format->extra_size + 1, sizeof(prep_laz_model *));
     s->arena.size = arena_size(format);
     s->arena.bytes = malloc(s->arena.size); /* touched only as far as it is used */
-    if (s->layers != NULL && s->sizes != NULL && s->lasts != NULL && s->extra_models != NULL && s->arena.bytes != NULL)
+    if (s->layers != NULL && s->sizes != NULL && s->lasts != NULL && s->extra_models != NULL &&
+        s->arena.bytes != NULL)
         return s;
     prep_laz_layers_destroy(s);
     return NULL;
@@ -180,7 +217,8 @@ static bool read_sizes(prep_laz_layers *s, prep_laz_source *source, mospt_err *e
 {
     const prep_laz_format *f = &s->format;
     uint32_t stored = 1;
-    for (uint32_t i = 0; i < s->layer_count; i++) stored += has_layer(f, i);
+    for (uint32_t i = 0; i < s->layer_count; i++)
+        stored += has_layer(f, i);
     if (!prep_laz_source_take(source, s->sizes, 4 * (size_t)stored, err)) return false;
     const uint8_t *p = s->sizes;
     s->points = prep_le32(p);
@@ -205,7 +243,8 @@ static bool alloc_windows(prep_laz_layers *s, uint64_t available, mospt_err *err
             l->size = available;
         }
         available -= l->size;
-        if (l->size > 0) size += window_capacity(l, i) + prep_laz_stream_margin(layer_need[kind_of(i)]);
+        if (l->size > 0)
+            size += window_capacity(l, i) + prep_laz_stream_margin(layer_need[kind_of(i)]);
     }
     if (size <= s->windows_size) return true;
     free(s->windows);
@@ -220,7 +259,8 @@ static bool begin_streams(prep_laz_layers *s, prep_laz_source source, mospt_err 
     for (uint32_t i = 0; i < s->layer_count; i++) {
         layer *l = &s->layers[i];
         if (l->size == 0) continue;
-        size_t capacity = window_capacity(l, i), margin = prep_laz_stream_margin(layer_need[kind_of(i)]);
+        size_t capacity = window_capacity(l, i),
+               margin = prep_laz_stream_margin(layer_need[kind_of(i)]);
         prep_laz_source own = source;
         own.size = l->size;
         if (i != LAYER_WAVE || !s->format.leaves_out_waves) {
@@ -279,7 +319,8 @@ static void take_first(prep_laz_layers *s, const uint8_t *p)
     memcpy(c->last, p, s->format.record_length);
 }
 
-bool prep_laz_layers_begin(prep_laz_layers *s, prep_laz_source source, uint8_t *first, mospt_err *err)
+bool prep_laz_layers_begin(prep_laz_layers *s, prep_laz_source source, uint8_t *first,
+                           mospt_err *err)
 {
     const prep_laz_format *f = &s->format;
     s->points = 0;
@@ -305,29 +346,30 @@ const char *prep_laz_layers_damage(const prep_laz_layers *s, uint64_t *byte)
     const layer *broken = NULL, *unused = NULL;
     for (uint32_t i = s->layer_count; i-- > 0;) {
         const layer *l = &s->layers[i];
-        if (l->is_broken || (l->is_live && prep_laz_stream_is_beyond(&l->stream)))
-            broken = l;
-        else if (l->is_live && prep_laz_stream_left(&l->stream) > 0)
-            unused = l;
+        if (l->is_broken || (l->is_live && prep_laz_stream_is_beyond(&l->stream))) broken = l;
+        else if (l->is_live && prep_laz_stream_left(&l->stream) > 0) unused = l;
     }
-    const layer *found = broken != NULL ? broken : unused; /* where one breaks, others may be left half read */
+    const layer *found =
+        broken != NULL ? broken : unused; /* where one breaks, others may be left half read */
     if (found == NULL) return NULL;
     *byte = found->offset;
     return layer_damage[kind_of((uint32_t)(found - s->layers))];
 }
 
-bool prep_laz_layers_measure(const prep_laz_format *f, prep_laz_source source, uint32_t *points, uint64_t *size,
-                             mospt_err *err)
+bool prep_laz_layers_measure(const prep_laz_format *f, prep_laz_source source, uint32_t *points,
+                             uint64_t *size, mospt_err *err)
 {
     uint8_t sizes[4 * (LAYER_BYTE + PREP_LAZ_EXTRA_MAX + 1)];
     uint32_t layers = 0;
-    for (uint32_t i = 0; i < LAYER_BYTE + (uint32_t)f->extra_size; i++) layers += has_layer(f, i);
+    for (uint32_t i = 0; i < LAYER_BYTE + (uint32_t)f->extra_size; i++)
+        layers += has_layer(f, i);
     if (source.size < f->record_length) return false;
     prep_laz_source_skip(&source, f->record_length);
     if (!prep_laz_source_take(&source, sizes, 4 * (size_t)(layers + 1), err)) return false;
     *points = prep_le32(sizes);
     *size = f->record_length + 4 * (uint64_t)(layers + 1);
-    for (uint32_t i = 1; i <= layers; i++) *size += prep_le32(sizes + 4 * i);
+    for (uint32_t i = 1; i <= layers; i++)
+        *size += prep_le32(sizes + 4 * i);
     return true;
 }
 
@@ -351,9 +393,9 @@ static inline uint32_t even_at_most(uint32_t magnitude, uint32_t most)
     return magnitude < most ? magnitude & ~1u : most;
 }
 
-/* Where the channel changes, colours and the like change theirs. Version 3 does so for that one point only and returns to
- * channel 0 with the next; and it goes on from the last value of the channel before, where the new one has some already.
- * Version 4 is as one would expect. */
+/* Where the channel changes, colours and the like change theirs. Version 3 does so for that one
+ * point only and returns to channel 0 with the next; and it goes on from the last value of the
+ * channel before, where the new one has some already. Version 4 is as one would expect. */
 static void follow_channel(prep_laz_layers *s, bool has_changed, note *n)
 {
     bool is_3 = s->format.version == 3;
@@ -370,9 +412,11 @@ static void follow_channel(prep_laz_layers *s, bool has_changed, note *n)
     n->item = (uint8_t)item;
 }
 
-PREP_LAZ_INLINE channel_state *switch_channel(prep_laz_layers *s, prep_laz_range *r, channel_state *c, note *n)
+PREP_LAZ_INLINE channel_state *switch_channel(prep_laz_layers *s, prep_laz_range *r,
+                                              channel_state *c, note *n)
 {
-    uint32_t ahead = 1 + prep_laz_range_symbol(r, prep_laz_model_at(&c->other_channel, &s->arena, 3));
+    uint32_t ahead =
+        1 + prep_laz_range_symbol(r, prep_laz_model_at(&c->other_channel, &s->arena, 3));
     uint32_t channel = (s->channel + ahead) & 3;
     channel_state *to = &s->channels[channel];
     if (!(s->known >> channel & 1)) {
@@ -387,12 +431,14 @@ PREP_LAZ_INLINE channel_state *switch_channel(prep_laz_layers *s, prep_laz_range
     return to;
 }
 
-PREP_LAZ_INLINE void read_returns(prep_laz_range *r, prep_laz_arena *arena, channel_state *c, uint32_t changed)
+PREP_LAZ_INLINE void read_returns(prep_laz_range *r, prep_laz_arena *arena, channel_state *c,
+                                  uint32_t changed)
 {
     bool has_new_time = changed >> 4 & 1;
     uint32_t number = c->number;
     if (changed & 4)
-        c->returns = (uint8_t)prep_laz_range_symbol(r, prep_laz_model_at(&c->returns_model[c->returns], arena, 16));
+        c->returns = (uint8_t)prep_laz_range_symbol(
+            r, prep_laz_model_at(&c->returns_model[c->returns], arena, 16));
     switch (changed & 3) {
     case 0:
         return;
@@ -404,9 +450,9 @@ PREP_LAZ_INLINE void read_returns(prep_laz_range *r, prep_laz_arena *arena, chan
         break;
     default:
         if (has_new_time)
-            number = prep_laz_range_symbol(r, prep_laz_model_at(&c->number_model[number], arena, 16));
-        else
-            number += 2 + prep_laz_range_symbol(r, prep_laz_model_at(&c->number_step, arena, 13));
+            number =
+                prep_laz_range_symbol(r, prep_laz_model_at(&c->number_model[number], arena, 16));
+        else number += 2 + prep_laz_range_symbol(r, prep_laz_model_at(&c->number_step, arena, 13));
         break;
     }
     c->number = number & 15;
@@ -422,11 +468,13 @@ PREP_LAZ_INLINE void read_xy(prep_laz_range *r, prep_laz_arena *arena, channel_s
     bool is_single = c->returns == 1;
     uint32_t group = (uint32_t)(return_context[c->returns][c->number] - '0') << 1 | n->has_new_time;
     prep_laz_median *x = &c->x_median[group], *y = &c->y_median[group];
-    uint32_t step = prep_laz_integer_read(r, arena, &c->x_integer, &c->x_context[is_single], (uint32_t)x->sorted[2]);
+    uint32_t step = prep_laz_integer_read(r, arena, &c->x_integer, &c->x_context[is_single],
+                                          (uint32_t)x->sorted[2]);
     c->x += step;
     prep_laz_median_add(x, (int32_t)step);
     uint32_t k = c->x_integer.magnitude;
-    step = prep_laz_integer_read(r, arena, &c->y_integer, &c->y_context[even_at_most(k, 20) + is_single],
+    step = prep_laz_integer_read(r, arena, &c->y_integer,
+                                 &c->y_context[even_at_most(k, 20) + is_single],
                                  (uint32_t)y->sorted[2]);
     c->y += step;
     prep_laz_median_add(y, (int32_t)step);
@@ -445,7 +493,8 @@ static size_t read_first_layer(prep_laz_layers *s, uint8_t *record, size_t count
         channel_state *c = &s->channels[s->channel];
         note *n = &s->notes[i];
         uint32_t context = pulse_ends(c) | (uint32_t)c->had_new_time << 2;
-        uint32_t changed = prep_laz_range_symbol(&r, prep_laz_model_at(&c->changed[context], &s->arena, 128));
+        uint32_t changed =
+            prep_laz_range_symbol(&r, prep_laz_model_at(&c->changed[context], &s->arena, 128));
         n->from = NOBODY;
         if (changed & 64) c = switch_channel(s, &r, c, n);
         follow_channel(s, changed >> 6, n);
@@ -477,13 +526,13 @@ static size_t read_z(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) {
             c->z = s->channels[n->from].z;
-            for (uint32_t k = 0; k < 8; k++) c->heights[k] = c->z;
+            for (uint32_t k = 0; k < 8; k++)
+                c->heights[k] = c->z;
         }
         if (layer_ready(l, &r))
-            c->z = c->heights[n->level] = prep_laz_integer_read(&r, &s->arena, &c->z_integer, &c->z_context[n->z_context],
-                                                               c->heights[n->level]);
-        else if (l->is_broken)
-            break;
+            c->z = c->heights[n->level] = prep_laz_integer_read(
+                &r, &s->arena, &c->z_integer, &c->z_context[n->z_context], c->heights[n->level]);
+        else if (l->is_broken) break;
         prep_laz_put32(record + 8, c->z);
     }
     l->stream.range = r;
@@ -516,7 +565,8 @@ static void read_flags(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) c->flags = s->channels[n->from].flags;
         if (layer_ready(l, &r))
-            c->flags = (uint8_t)prep_laz_range_symbol(&r, prep_laz_model_at(&c->flags_model[c->flags], &s->arena, 64));
+            c->flags = (uint8_t)prep_laz_range_symbol(
+                &r, prep_laz_model_at(&c->flags_model[c->flags], &s->arena, 64));
         record[15] = (uint8_t)((c->flags & 15) | n->channel << 4 | (c->flags & 0x30) << 2);
     }
     l->stream.range = r;
@@ -531,12 +581,13 @@ static void read_intensity(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) {
             c->intensity = s->channels[n->from].intensity;
-            for (uint32_t k = 0; k < 8; k++) c->intensities[k] = c->intensity;
+            for (uint32_t k = 0; k < 8; k++)
+                c->intensities[k] = c->intensity;
         }
         if (layer_ready(l, &r)) {
             uint16_t *last = &c->intensities[n->ends << 1 | n->has_new_time];
-            *last = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->intensity_integer, &c->intensity_context[n->ends],
-                                                    *last);
+            *last = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->intensity_integer,
+                                                    &c->intensity_context[n->ends], *last);
             c->intensity = *last;
         }
         prep_laz_put16(record + 12, c->intensity);
@@ -553,8 +604,8 @@ static void read_angle(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) c->angle = s->channels[n->from].angle;
         if (n->has_new_angle && layer_ready(l, &r))
-            c->angle = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->angle_integer,
-                                                       &c->angle_context[n->has_new_time], c->angle);
+            c->angle = (uint16_t)prep_laz_integer_read(
+                &r, &s->arena, &c->angle_integer, &c->angle_context[n->has_new_time], c->angle);
         prep_laz_put16(record + 18, c->angle);
     }
     l->stream.range = r;
@@ -569,7 +620,8 @@ static void read_user(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) c->user = s->channels[n->from].user;
         if (layer_ready(l, &r))
-            c->user = (uint8_t)prep_laz_range_symbol(&r, prep_laz_model_at(&c->user_model[c->user / 4], &s->arena, 256));
+            c->user = (uint8_t)prep_laz_range_symbol(
+                &r, prep_laz_model_at(&c->user_model[c->user / 4], &s->arena, 256));
         record[17] = c->user;
     }
     l->stream.range = r;
@@ -584,7 +636,8 @@ static void read_source(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->channel];
         if (n->from != NOBODY) c->source = s->channels[n->from].source;
         if (n->has_new_source && layer_ready(l, &r))
-            c->source = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->source_integer, &c->source_context, c->source);
+            c->source = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->source_integer,
+                                                        &c->source_context, c->source);
         prep_laz_put16(record + 20, c->source);
     }
     l->stream.range = r;
@@ -639,7 +692,8 @@ static void read_nir(prep_laz_layers *s, uint8_t *record, size_t count)
         channel_state *c = &s->channels[n->item];
         uint8_t *last = last_of(s, n, at, 2);
         if (layer_ready(l, &r)) {
-            uint32_t changed = prep_laz_range_symbol(&r, prep_laz_model_at(&c->nir_changed, &s->arena, 4));
+            uint32_t changed =
+                prep_laz_range_symbol(&r, prep_laz_model_at(&c->nir_changed, &s->arena, 4));
             for (uint32_t k = 0; k < 2; k++) {
                 if (changed >> k & 1)
                     last[k] = (uint8_t)prep_laz_byte_read(&r, &s->arena, &c->nir_byte[k], last[k]);
@@ -672,7 +726,8 @@ static void read_byte(prep_laz_layers *s, uint32_t index, uint8_t *record, size_
         const note *n = &s->notes[i];
         uint8_t *last = last_of(s, n, at, 1);
         if (layer_ready(l, &r))
-            *last = (uint8_t)prep_laz_byte_read(&r, &s->arena, &s->channels[n->item].extra_model[index], *last);
+            *last = (uint8_t)prep_laz_byte_read(&r, &s->arena,
+                                                &s->channels[n->item].extra_model[index], *last);
         record[at] = *last;
     }
     l->stream.range = r;
@@ -692,7 +747,8 @@ static size_t read_block(prep_laz_layers *s, uint8_t *records, size_t count)
     if (s->format.rgb_at != 0) read_rgb(s, records, count);
     if (s->format.nir_at != 0) read_nir(s, records, count);
     if (s->format.wave_at != 0) read_wave(s, records, count);
-    for (uint32_t i = 0; i < s->format.extra_size; i++) read_byte(s, i, records, count);
+    for (uint32_t i = 0; i < s->format.extra_size; i++)
+        read_byte(s, i, records, count);
     return count;
 }
 

@@ -5,12 +5,13 @@
 
 enum { WINDOW_SIZE = 64 * 1024, POINT_SIZE = 20 };
 
-/* One context per combination of return number (columns) and number of returns (rows); the sensible ones of up to five
- * returns have one of their own, the others share. */
+/* One context per combination of return number (columns) and number of returns (rows); the sensible
+ * ones of up to five returns have one of their own, the others share. */
 static const uint8_t return_context[8][8] = {
-    {15, 14, 13, 12, 11, 10, 9, 8},    {14, 0, 1, 3, 6, 10, 10, 9},      {13, 1, 2, 4, 7, 11, 11, 10},
-    {12, 3, 4, 5, 8, 12, 12, 11},      {11, 6, 7, 8, 9, 13, 13, 12},     {10, 10, 11, 12, 13, 14, 14, 13},
-    {9, 10, 11, 12, 13, 14, 15, 14},   {8, 9, 10, 11, 12, 13, 14, 15},
+    {15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},
+    {13, 1, 2, 4, 7, 11, 11, 10},    {12, 3, 4, 5, 8, 12, 12, 11},
+    {11, 6, 7, 8, 9, 13, 13, 12},    {10, 10, 11, 12, 13, 14, 14, 13},
+    {9, 10, 11, 12, 13, 14, 15, 14}, {8, 9, 10, 11, 12, 13, 14, 15},
 };
 
 typedef struct {
@@ -25,10 +26,12 @@ typedef struct {
     uint32_t height[8];
     uint16_t intensities[16];
 
-    prep_laz_model *changed, *returns_model[256], *classification_model[256], *user_model[256], *angle_model[2];
-    prep_laz_integer x_integer, y_integer, z_integer, intensity_integer, source_integer, angle_integer;
-    prep_laz_model *x_context[2], *y_context[22], *z_context[20], *intensity_context[4], *source_context,
-        *angle_context[2];
+    prep_laz_model *changed, *returns_model[256], *classification_model[256], *user_model[256],
+        *angle_model[2];
+    prep_laz_integer x_integer, y_integer, z_integer, intensity_integer, source_integer,
+        angle_integer;
+    prep_laz_model *x_context[2], *y_context[22], *z_context[20], *intensity_context[4],
+        *source_context, *angle_context[2];
 } point_state;
 
 struct prep_laz_rows {
@@ -42,15 +45,18 @@ struct prep_laz_rows {
     prep_laz_rgb rgb;
     prep_laz_wave wave;
     prep_laz_integer extra_integer; /* version 1 */
-    prep_laz_model **extra_model;   /* [extra_size], owned: of the byte, or in version 1 of its magnitude */
-    uint8_t *last;                  /* [record_length], owned: colour, packet and extra bytes of the last record */
+    prep_laz_model *
+        *extra_model; /* [extra_size], owned: of the byte, or in version 1 of its magnitude */
+    uint8_t *last; /* [record_length], owned: colour, packet and extra bytes of the last record */
 };
 
 static size_t arena_size(const prep_laz_format *f)
 {
     size_t size = prep_laz_model_size(64) + (3 * 256 + 2) * prep_laz_model_size(256);
-    size += prep_laz_integer_size(32, 2) + prep_laz_integer_size(32, 22) + prep_laz_integer_size(32, 20);
-    size += prep_laz_integer_size(16, 4) + prep_laz_integer_size(16, 1) + prep_laz_integer_size(8, 2);
+    size += prep_laz_integer_size(32, 2) + prep_laz_integer_size(32, 22) +
+            prep_laz_integer_size(32, 20);
+    size +=
+        prep_laz_integer_size(16, 4) + prep_laz_integer_size(16, 1) + prep_laz_integer_size(8, 2);
     if (f->gps_at != 0) size += prep_laz_gps_size();
     if (f->rgb_at != 0) size += prep_laz_rgb_size();
     if (f->wave_at != 0) size += prep_laz_wave_size();
@@ -70,7 +76,8 @@ prep_laz_rows *prep_laz_rows_create(const prep_laz_format *format)
     s->arena.bytes = malloc(s->arena.size); /* touched only as far as it is used */
     s->extra_model = calloc((size_t)format->extra_size + 1, sizeof(prep_laz_model *));
     s->last = malloc(format->record_length);
-    if (s->window != NULL && s->arena.bytes != NULL && s->extra_model != NULL && s->last != NULL) return s;
+    if (s->window != NULL && s->arena.bytes != NULL && s->extra_model != NULL && s->last != NULL)
+        return s;
     prep_laz_rows_destroy(s);
     return NULL;
 }
@@ -117,8 +124,8 @@ bool prep_laz_rows_begin(prep_laz_rows *s, prep_laz_source source, uint8_t *firs
     prep_laz_integer_init(&s->extra_integer, 8);
     memset(s->extra_model, 0, ((size_t)f->extra_size + 1) * sizeof(prep_laz_model *));
     memcpy(s->last, first, f->record_length);
-    return prep_laz_stream_begin(&s->stream, source, s->window, s->window_capacity, prep_laz_stream_margin(s->need),
-                                 err);
+    return prep_laz_stream_begin(&s->stream, source, s->window, s->window_capacity,
+                                 prep_laz_stream_margin(s->need), err);
 }
 
 uint64_t prep_laz_rows_left(const prep_laz_rows *s)
@@ -127,25 +134,32 @@ uint64_t prep_laz_rows_left(const prep_laz_rows *s)
 }
 
 /* What versions 1 and 2 read alike: the new value of a byte, whose old value picks the model. */
-PREP_LAZ_INLINE uint8_t read_by_last(prep_laz_range *r, prep_laz_arena *arena, prep_laz_model **models, uint8_t last)
+PREP_LAZ_INLINE uint8_t read_by_last(prep_laz_range *r, prep_laz_arena *arena,
+                                     prep_laz_model **models, uint8_t last)
 {
     return (uint8_t)prep_laz_range_symbol(r, prep_laz_model_at(&models[last], arena, 256));
 }
 
-PREP_LAZ_INLINE void read_attributes(prep_laz_range *r, prep_laz_arena *arena, point_state *p, uint32_t changed)
+PREP_LAZ_INLINE void read_attributes(prep_laz_range *r, prep_laz_arena *arena, point_state *p,
+                                     uint32_t changed)
 {
     if (changed & 32) p->returns = read_by_last(r, arena, p->returns_model, p->returns);
-    uint32_t number = p->returns & 7, returns = p->returns >> 3 & 7, m = return_context[returns][number];
+    uint32_t number = p->returns & 7, returns = p->returns >> 3 & 7,
+             m = return_context[returns][number];
     if (changed & 16)
         p->intensities[m] = (uint16_t)prep_laz_integer_read(r, arena, &p->intensity_integer,
-                                                            &p->intensity_context[m < 3 ? m : 3], p->intensities[m]);
+                                                            &p->intensity_context[m < 3 ? m : 3],
+                                                            p->intensities[m]);
     p->intensity = p->intensities[m];
-    if (changed & 8) p->classification = read_by_last(r, arena, p->classification_model, p->classification);
+    if (changed & 8)
+        p->classification = read_by_last(r, arena, p->classification_model, p->classification);
     if (changed & 4)
-        p->angle = (uint8_t)prep_laz_byte_read(r, arena, &p->angle_model[p->returns >> 6 & 1], p->angle);
+        p->angle =
+            (uint8_t)prep_laz_byte_read(r, arena, &p->angle_model[p->returns >> 6 & 1], p->angle);
     if (changed & 2) p->user = read_by_last(r, arena, p->user_model, p->user);
     if (changed & 1)
-        p->source = (uint16_t)prep_laz_integer_read(r, arena, &p->source_integer, &p->source_context, p->source);
+        p->source = (uint16_t)prep_laz_integer_read(r, arena, &p->source_integer,
+                                                    &p->source_context, p->source);
 }
 
 static inline uint32_t even_at_most(uint32_t magnitude, uint32_t most)
@@ -158,23 +172,26 @@ PREP_LAZ_INLINE void read_point(prep_laz_range *r, prep_laz_arena *arena, point_
     uint32_t changed = prep_laz_range_symbol(r, prep_laz_model_at(&p->changed, arena, 64));
     if (changed != 0) read_attributes(r, arena, p, changed);
 
-    uint32_t number = p->returns & 7, returns = p->returns >> 3 & 7, m = return_context[returns][number];
+    uint32_t number = p->returns & 7, returns = p->returns >> 3 & 7,
+             m = return_context[returns][number];
     uint32_t level = returns > number ? returns - number : number - returns;
     bool is_single = returns == 1;
     prep_laz_median *x = &p->x_median[m], *y = &p->y_median[m];
-    uint32_t step = prep_laz_integer_read(r, arena, &p->x_integer, &p->x_context[is_single], (uint32_t)x->sorted[2]);
+    uint32_t step = prep_laz_integer_read(r, arena, &p->x_integer, &p->x_context[is_single],
+                                          (uint32_t)x->sorted[2]);
     p->x += step;
     prep_laz_median_add(x, (int32_t)step);
 
     uint32_t k = p->x_integer.magnitude;
-    step = prep_laz_integer_read(r, arena, &p->y_integer, &p->y_context[even_at_most(k, 20) + is_single],
+    step = prep_laz_integer_read(r, arena, &p->y_integer,
+                                 &p->y_context[even_at_most(k, 20) + is_single],
                                  (uint32_t)y->sorted[2]);
     p->y += step;
     prep_laz_median_add(y, (int32_t)step);
 
     k = (k + p->y_integer.magnitude) / 2;
-    p->z = p->height[level] = prep_laz_integer_read(r, arena, &p->z_integer,
-                                                   &p->z_context[even_at_most(k, 18) + is_single], p->height[level]);
+    p->z = p->height[level] = prep_laz_integer_read(
+        r, arena, &p->z_integer, &p->z_context[even_at_most(k, 18) + is_single], p->height[level]);
 }
 
 static uint32_t median_of_3(const int32_t v[3])
@@ -185,9 +202,11 @@ static uint32_t median_of_3(const int32_t v[3])
 
 PREP_LAZ_INLINE void read_old_point(prep_laz_range *r, prep_laz_arena *arena, point_state *p)
 {
-    uint32_t x = prep_laz_integer_read(r, arena, &p->x_integer, &p->x_context[0], median_of_3(p->x_step));
+    uint32_t x =
+        prep_laz_integer_read(r, arena, &p->x_integer, &p->x_context[0], median_of_3(p->x_step));
     uint32_t k = p->x_integer.magnitude;
-    uint32_t y = prep_laz_integer_read(r, arena, &p->y_integer, &p->y_context[k < 19 ? k : 19], median_of_3(p->y_step));
+    uint32_t y = prep_laz_integer_read(r, arena, &p->y_integer, &p->y_context[k < 19 ? k : 19],
+                                       median_of_3(p->y_step));
     k = (k + p->y_integer.magnitude) / 2;
     p->x += x;
     p->y += y;
@@ -198,15 +217,18 @@ PREP_LAZ_INLINE void read_old_point(prep_laz_range *r, prep_laz_arena *arena, po
 
     uint32_t changed = prep_laz_range_symbol(r, prep_laz_model_at(&p->changed, arena, 64));
     if (changed & 32)
-        p->intensity = (uint16_t)prep_laz_integer_read(r, arena, &p->intensity_integer, &p->intensity_context[0],
-                                                       p->intensity);
+        p->intensity = (uint16_t)prep_laz_integer_read(r, arena, &p->intensity_integer,
+                                                       &p->intensity_context[0], p->intensity);
     if (changed & 16) p->returns = read_by_last(r, arena, p->returns_model, p->returns);
-    if (changed & 8) p->classification = read_by_last(r, arena, p->classification_model, p->classification);
+    if (changed & 8)
+        p->classification = read_by_last(r, arena, p->classification_model, p->classification);
     if (changed & 4)
-        p->angle = (uint8_t)prep_laz_integer_read(r, arena, &p->angle_integer, &p->angle_context[k < 3], p->angle);
+        p->angle = (uint8_t)prep_laz_integer_read(r, arena, &p->angle_integer,
+                                                  &p->angle_context[k < 3], p->angle);
     if (changed & 2) p->user = read_by_last(r, arena, p->user_model, p->user);
     if (changed & 1)
-        p->source = (uint16_t)prep_laz_integer_read(r, arena, &p->source_integer, &p->source_context, p->source);
+        p->source = (uint16_t)prep_laz_integer_read(r, arena, &p->source_integer,
+                                                    &p->source_context, p->source);
 }
 
 /* Version 1 knows one sequence of times only, and codes a multiple of the step, or all 64 bits. */
@@ -241,12 +263,14 @@ PREP_LAZ_INLINE void read_old_gps(prep_laz_range *r, prep_laz_arena *arena, prep
     g->time[0] += (uint64_t)(int64_t)(int32_t)delta;
 }
 
-PREP_LAZ_INLINE void read_old_rgb(prep_laz_range *r, prep_laz_arena *arena, prep_laz_rgb *rgb, uint8_t *last)
+PREP_LAZ_INLINE void read_old_rgb(prep_laz_range *r, prep_laz_arena *arena, prep_laz_rgb *rgb,
+                                  uint8_t *last)
 {
     uint32_t changed = prep_laz_range_symbol(r, prep_laz_model_at(&rgb->changed, arena, 64));
     for (uint32_t i = 0; i < 6; i++) {
         if (changed >> i & 1)
-            last[i] = (uint8_t)prep_laz_integer_read(r, arena, &rgb->integer, &rgb->context[i], last[i]);
+            last[i] =
+                (uint8_t)prep_laz_integer_read(r, arena, &rgb->integer, &rgb->context[i], last[i]);
     }
 }
 
@@ -254,7 +278,8 @@ PREP_LAZ_INLINE void read_extra(prep_laz_range *r, prep_laz_rows *s, uint8_t *la
 {
     for (uint32_t i = 0; i < s->format.extra_size; i++) {
         prep_laz_model **model = &s->extra_model[i];
-        last[i] = (uint8_t)(is_old ? prep_laz_integer_read(r, &s->arena, &s->extra_integer, model, last[i])
+        last[i] = (uint8_t)(is_old ? prep_laz_integer_read(r, &s->arena, &s->extra_integer, model,
+                                                           last[i])
                                    : prep_laz_byte_read(r, &s->arena, model, last[i]));
     }
 }
@@ -280,23 +305,17 @@ PREP_LAZ_INLINE size_t read_rows(prep_laz_rows *s, uint8_t *record, size_t count
     prep_laz_range r = s->stream.range;
     size_t i = 0;
     for (; i < count && prep_laz_ready(&s->stream, &r); i++, record += f.record_length) {
-        if (is_old)
-            read_old_point(&r, arena, &s->point);
-        else
-            read_point(&r, arena, &s->point);
+        if (is_old) read_old_point(&r, arena, &s->point);
+        else read_point(&r, arena, &s->point);
         put_point(&s->point, record);
         if (f.gps_at != 0) {
-            if (is_old)
-                read_old_gps(&r, arena, &s->gps);
-            else
-                prep_laz_gps_read(&r, arena, &s->gps, true);
+            if (is_old) read_old_gps(&r, arena, &s->gps);
+            else prep_laz_gps_read(&r, arena, &s->gps, true);
             prep_laz_put64(record + f.gps_at, s->gps.time[s->gps.current]);
         }
         if (f.rgb_at != 0) {
-            if (is_old)
-                read_old_rgb(&r, arena, &s->rgb, s->last + f.rgb_at);
-            else
-                prep_laz_rgb_read(&r, arena, &s->rgb, s->last + f.rgb_at);
+            if (is_old) read_old_rgb(&r, arena, &s->rgb, s->last + f.rgb_at);
+            else prep_laz_rgb_read(&r, arena, &s->rgb, s->last + f.rgb_at);
             memcpy(record + f.rgb_at, s->last + f.rgb_at, 6);
         }
         if (f.wave_at != 0) {
@@ -316,6 +335,8 @@ PREP_LAZ_INLINE size_t read_rows(prep_laz_rows *s, uint8_t *record, size_t count
 
 size_t prep_laz_rows_read(prep_laz_rows *s, uint8_t *records, size_t count)
 {
-    size_t got = s->format.version == 1 ? read_rows(s, records, count, true) : read_rows(s, records, count, false);
-    return got - (got > 0 && prep_laz_stream_is_beyond(&s->stream)); /* the last record was made of nothing */
+    size_t got = s->format.version == 1 ? read_rows(s, records, count, true)
+                                        : read_rows(s, records, count, false);
+    return got - (got > 0 &&
+                  prep_laz_stream_is_beyond(&s->stream)); /* the last record was made of nothing */
 }

@@ -12,7 +12,8 @@ enum {
 static uint32_t start_log2(uint32_t symbols)
 {
     uint32_t log2 = 0;
-    while (2u << log2 < symbols && log2 < 8) log2++;
+    while (1u << log2 < symbols && log2 < 9)
+        log2++;
     return log2;
 }
 
@@ -26,11 +27,13 @@ size_t prep_laz_model_size(uint32_t symbols)
 size_t prep_laz_integer_size(uint32_t bits, uint32_t contexts)
 {
     size_t size = contexts * prep_laz_model_size(bits + 1);
-    for (uint32_t k = 1; k <= bits && k < 32; k++) size += prep_laz_model_size(1u << (k < 8 ? k : 8));
+    for (uint32_t k = 1; k <= bits && k < 32; k++)
+        size += prep_laz_model_size(1u << (k < 8 ? k : 8));
     return size;
 }
 
-/* Places follow from the counts, all rounded down; a count of at least 1 of at most 2^15 leaves no symbol without one. */
+/* Places follow from the counts, all rounded down; a count of at least 1 of at most 2^15 leaves no
+ * symbol without one. */
 static void distribute(prep_laz_model *m)
 {
     uint32_t scale = (1u << 31) / m->total, sum = 0, entry = 0;
@@ -41,7 +44,8 @@ static void distribute(prep_laz_model *m)
     m->low[m->symbols] = 1u << PLACES_LOG2;
     for (uint32_t s = 0; s < m->symbols; s++) {
         uint32_t end = (m->low[s + 1] + (1u << m->shift) - 1) >> m->shift;
-        while (entry < end) m->start[entry++] = (uint16_t)s;
+        while (entry < end)
+            m->start[entry++] = (uint16_t)s;
     }
 }
 
@@ -55,7 +59,8 @@ prep_laz_model *prep_laz_model_make(prep_laz_arena *arena, uint32_t symbols)
     m->shift = (uint16_t)(PLACES_LOG2 - start_log2(symbols));
     m->count = m->low + symbols + 1;
     m->start = m->count + symbols;
-    for (uint32_t s = 0; s < symbols; s++) m->count[s] = 1;
+    for (uint32_t s = 0; s < symbols; s++)
+        m->count[s] = 1;
     m->total = symbols;
     m->cycle = m->left = (uint16_t)((symbols + 6) >> 1);
     distribute(m);
@@ -79,7 +84,8 @@ void prep_laz_model_adapt(prep_laz_model *m)
 
 void prep_laz_bit_init(prep_laz_bit *b)
 {
-    *b = (prep_laz_bit){.zeros = 1, .total = 2, .zero_part = 1u << (BIT_PLACES_LOG2 - 1), .cycle = 4, .left = 4};
+    *b = (prep_laz_bit){
+        .zeros = 1, .total = 2, .zero_part = 1u << (BIT_PLACES_LOG2 - 1), .cycle = 4, .left = 4};
 }
 
 void prep_laz_bit_adapt(prep_laz_bit *b)
@@ -107,6 +113,7 @@ void prep_laz_integer_init(prep_laz_integer *integer, uint32_t bits)
 void prep_laz_range_begin(prep_laz_range *range, const uint8_t *bytes)
 {
     range->length = UINT32_MAX;
-    range->value = (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
+    range->value =
+        (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
     range->next = bytes + 4;
 }

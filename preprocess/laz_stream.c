@@ -14,10 +14,8 @@ bool prep_laz_source_take(prep_laz_source *source, void *out, size_t size, mospt
 {
     if (size > source->size) return false;
     size_t got = size;
-    if (source->input == NULL)
-        memcpy(out, source->bytes, size);
-    else if (!prep_input_read_at(source->input, source->offset, out, size, &got, err))
-        return false;
+    if (source->input == NULL) memcpy(out, source->bytes, size);
+    else if (!prep_input_read_at(source->input, source->offset, out, size, &got, err)) return false;
     if (got < size) return false;
     prep_laz_source_skip(source, size);
     return true;
@@ -44,7 +42,8 @@ static bool load(prep_laz_stream *s, size_t left)
     mospt_err ignored = {0};
     s->range.next = s->window;
     s->held = left;
-    if (!prep_laz_source_take(&s->source, s->window + left, room, s->err != NULL ? s->err : &ignored)) {
+    if (!prep_laz_source_take(&s->source, s->window + left, room,
+                              s->err != NULL ? s->err : &ignored)) {
         s->has_failed = true;
         s->source.size = 0;
         room = 0;
@@ -56,10 +55,11 @@ static bool load(prep_laz_stream *s, size_t left)
     return !s->has_failed;
 }
 
-bool prep_laz_stream_begin(prep_laz_stream *s, prep_laz_source source, uint8_t *window, size_t capacity,
-                           size_t margin, mospt_err *err)
+bool prep_laz_stream_begin(prep_laz_stream *s, prep_laz_source source, uint8_t *window,
+                           size_t capacity, size_t margin, mospt_err *err)
 {
-    *s = (prep_laz_stream){.window = window, .capacity = capacity, .margin = margin, .source = source, .err = err};
+    *s = (prep_laz_stream){
+        .window = window, .capacity = capacity, .margin = margin, .source = source, .err = err};
     s->range.next = window;
     if (!load(s, 0) || s->held < 4) return false;
     prep_laz_range_begin(&s->range, s->window);

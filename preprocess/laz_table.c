@@ -6,13 +6,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The record "laszip encoded": u16 compressor, u16 coder, u8 u8 u16 version, u32 options, u32 points of a chunk, i64 i64
- * special records, u16 number of items, and for each u16 type, u16 size, u16 version. */
+/* The record "laszip encoded": u16 compressor, u16 coder, u8 u8 u16 version, u32 options, u32
+ * points of a chunk, i64 i64 special records, u16 number of items, and for each u16 type, u16 size,
+ * u16 version. */
 enum {
     RECORD_SIZE = 34,
     ITEM_SIZE = 6,
-    ITEM_BYTE = 0, ITEM_POINT10 = 6, ITEM_GPSTIME11, ITEM_RGB12, ITEM_WAVEPACKET13,
-    ITEM_POINT14, ITEM_RGB14, ITEM_RGBNIR14, ITEM_WAVEPACKET14, ITEM_BYTE14,
+    ITEM_BYTE = 0,
+    ITEM_POINT10 = 6,
+    ITEM_GPSTIME11,
+    ITEM_RGB12,
+    ITEM_WAVEPACKET13,
+    ITEM_POINT14,
+    ITEM_RGB14,
+    ITEM_RGBNIR14,
+    ITEM_WAVEPACKET14,
+    ITEM_BYTE14,
     ITEMS_MAX = 5,
     VARIABLE = -1, /* as u32: chunks differ in size */
     POINTER_SIZE = 8,
@@ -29,7 +38,8 @@ typedef struct {
 static uint32_t list_items(const prep_las_header *h, item items[ITEMS_MAX], prep_laz_format *f)
 {
     uint8_t format = h->point_format;
-    bool has_gps = format == 1 || (format >= 3 && format <= 5), has_rgb = format == 2 || format == 3 || format == 5;
+    bool has_gps = format == 1 || (format >= 3 && format <= 5),
+         has_rgb = format == 2 || format == 3 || format == 5;
     uint16_t n = 0, at = 0;
     if (format < 6) {
         items[n++] = (item){ITEM_POINT10, at = 20};
@@ -57,15 +67,17 @@ static uint32_t list_items(const prep_las_header *h, item items[ITEMS_MAX], prep
 static bool is_version_known(const prep_laz_format *f, uint16_t type, uint16_t version)
 {
     if (f->compressor == PREP_LAZ_LAYER_CHUNKS) return version == f->version;
-    return type == ITEM_WAVEPACKET13 ? version == 1 || version == f->version : version == f->version;
+    return type == ITEM_WAVEPACKET13 ? version == 1 || version == f->version
+                                     : version == f->version;
 }
 
-static bool check_items(const uint8_t *record, const item *wanted, uint32_t count, mospt_where at, prep_laz_format *f,
-                        mospt_err *err)
+static bool check_items(const uint8_t *record, const item *wanted, uint32_t count, mospt_where at,
+                        prep_laz_format *f, mospt_err *err)
 {
     at.place += 32;
     if (prep_le16(record + 32) != count)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "points are compressed as %u items, point format %u needs %u",
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "points are compressed as %u items, point format %u needs %u",
                              prep_le16(record + 32), f->point_format, count);
     f->version = (uint8_t)(prep_le16(record + RECORD_SIZE + 4) & 255);
     bool is_layered = f->compressor == PREP_LAZ_LAYER_CHUNKS;
@@ -75,32 +87,38 @@ static bool check_items(const uint8_t *record, const item *wanted, uint32_t coun
         uint16_t type = prep_le16(p), size = prep_le16(p + 2), version = prep_le16(p + 4);
         if (type != wanted[i].type || size != wanted[i].size)
             return mospt_err_set(err, MOSPT_EFORMAT, at,
-                                 "item %u of a compressed point is type %u of %u bytes, point format %u needs type %u of %u",
+                                 "item %u of a compressed point is type %u of %u bytes, point "
+                                 "format %u needs type %u of %u",
                                  i, type, size, f->point_format, wanted[i].type, wanted[i].size);
-        if (!is_version_known(f, type, version) || version < (is_layered ? 3 : 1) || version > (is_layered ? 4 : 2))
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "version %u of item type %u is not known", version, type);
+        if (!is_version_known(f, type, version) || version < (is_layered ? 3 : 1) ||
+            version > (is_layered ? 4 : 2))
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "version %u of item type %u is not known",
+                                 version, type);
     }
     return true;
 }
 
-bool prep_laz_format_parse(const prep_las_header *h, const char *file, const uint8_t *record, size_t size,
-                           uint64_t offset, prep_laz_format *out, mospt_err *err)
+bool prep_laz_format_parse(const prep_las_header *h, const char *file, const uint8_t *record,
+                           size_t size, uint64_t offset, prep_laz_format *out, mospt_err *err)
 {
     mospt_where at = mospt_at_byte(file, offset);
     item items[ITEMS_MAX];
     prep_laz_format f = {.point_format = h->point_format, .record_length = h->record_length};
     uint32_t count = list_items(h, items, &f);
     if (size < RECORD_SIZE || size < RECORD_SIZE + ITEM_SIZE * (size_t)prep_le16(record + 32))
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "the description of the compression has only %zu bytes", size);
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "the description of the compression has only %zu bytes", size);
     uint16_t compressor = prep_le16(record), coder = prep_le16(record + 2);
     if (compressor < PREP_LAZ_ROWS || compressor > PREP_LAZ_LAYER_CHUNKS || coder != 0)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "compressor %u with coder %u is not known", compressor, coder);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "compressor %u with coder %u is not known",
+                             compressor, coder);
     f.compressor = (prep_laz_compressor)compressor;
     if ((f.compressor == PREP_LAZ_LAYER_CHUNKS) != (h->point_format >= 6))
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "compressor %u is not for point format %u", compressor,
-                             h->point_format);
+        return mospt_err_set(err, MOSPT_EFORMAT, at, "compressor %u is not for point format %u",
+                             compressor, h->point_format);
     if (f.extra_size > PREP_LAZ_EXTRA_MAX)
-        return mospt_err_set(err, MOSPT_EFORMAT, at, "%u extra bytes per compressed point, at most %d are read",
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "%u extra bytes per compressed point, at most %d are read",
                              f.extra_size, PREP_LAZ_EXTRA_MAX);
     f.chunk_points = prep_le32(record + 12);
     if (f.chunk_points == (uint32_t)VARIABLE) f.chunk_points = 0;
@@ -138,7 +156,8 @@ typedef struct {
     mospt_err *damage;
 } finder;
 
-static bool read_at(const finder *f, uint64_t offset, void *out, size_t size, bool *is_there, mospt_err *err)
+static bool read_at(const finder *f, uint64_t offset, void *out, size_t size, bool *is_there,
+                    mospt_err *err)
 {
     size_t got;
     if (!prep_input_read_at(f->input, offset, out, size, &got, err)) return false;
@@ -155,7 +174,8 @@ static bool find_table(const finder *f, uint64_t *out, mospt_err *err)
     if (!read_at(f, f->begin - POINTER_SIZE, p, sizeof p, &is_there, err)) return false;
     if (!is_there) return true;
     uint64_t at = prep_le64(p);
-    if (at == UINT64_MAX && f->file_size >= f->begin + POINTER_SIZE) { /* a writer that could not go back */
+    if (at == UINT64_MAX &&
+        f->file_size >= f->begin + POINTER_SIZE) { /* a writer that could not go back */
         if (!read_at(f, f->file_size - POINTER_SIZE, p, sizeof p, &is_there, err)) return false;
         at = is_there ? prep_le64(p) : 0;
     }
@@ -164,9 +184,10 @@ static bool find_table(const finder *f, uint64_t *out, mospt_err *err)
 }
 
 /* Reads one entry after the other as long as they make sense.
- * returns  false if there is no memory; all of them were read if table->count comes out as `count` */
-static bool read_entries(const finder *f, prep_laz_stream *stream, prep_laz_arena *arena, uint32_t count, uint64_t end,
-                         mospt_err *err)
+ * returns  false if there is no memory; all of them were read if table->count comes out as `count`
+ */
+static bool read_entries(const finder *f, prep_laz_stream *stream, prep_laz_arena *arena,
+                         uint32_t count, uint64_t end, mospt_err *err)
 {
     prep_laz_integer integer;
     prep_laz_model *context[2] = {NULL, NULL};
@@ -177,8 +198,7 @@ static bool read_entries(const finder *f, prep_laz_stream *stream, prep_laz_aren
         if (!prep_laz_ready(stream, &stream->range)) break;
         if (f->format->chunk_points == 0)
             points = prep_laz_integer_read(&stream->range, arena, &integer, &context[0], points);
-        else
-            points = f->format->chunk_points;
+        else points = f->format->chunk_points;
         size = prep_laz_integer_read(&stream->range, arena, &integer, &context[1], size);
         if (prep_laz_stream_is_beyond(stream) || points == 0) break;
         if (size < f->format->record_length || size > end - offset) break;
@@ -201,7 +221,8 @@ static bool decode_table(const finder *f, uint64_t at, uint32_t count, mospt_err
         goto done;
     }
     prep_laz_stream stream;
-    prep_laz_source source = {.input = f->input, .offset = at + TABLE_HEAD_SIZE,
+    prep_laz_source source = {.input = f->input,
+                              .offset = at + TABLE_HEAD_SIZE,
                               .size = f->file_size - at - TABLE_HEAD_SIZE};
     mospt_err failed = {0};
     ok = !prep_laz_stream_begin(&stream, source, window, TABLE_WINDOW_SIZE, margin, &failed) ||
@@ -230,7 +251,9 @@ static bool read_table(const finder *f, bool *is_good, mospt_err *err)
     if (!read_at(f, at, head, sizeof head, &is_there, err)) return false;
     uint32_t count = prep_le32(head + 4);
     uint64_t most = (at - f->begin) / f->format->record_length;
-    if (!is_there || prep_le32(head) != 0 || count == 0 || count > most || count > PREP_LAZ_CHUNKS_MAX) return true;
+    if (!is_there || prep_le32(head) != 0 || count == 0 || count > most ||
+        count > PREP_LAZ_CHUNKS_MAX)
+        return true;
     if (!decode_table(f, at, count, err)) return false;
     if (f->table->count < count) return true;
     const prep_laz_place *last = &f->table->places[count - 1];
@@ -246,19 +269,23 @@ static void fit_to_header(const finder *f)
     if (each != 0 && f->declared > 0 && f->declared <= all) {
         uint64_t chunks = (f->declared + each - 1) / each;
         if (chunks < t->count)
-            mospt_err_set(f->damage, MOSPT_EFORMAT, mospt_at_byte(f->file, t->places[chunks].offset),
-                          "the header claims %" PRIu64 " points, but the chunk table has %" PRIu32 " chunks of %" PRIu64,
+            mospt_err_set(f->damage, MOSPT_EFORMAT,
+                          mospt_at_byte(f->file, t->places[chunks].offset),
+                          "the header claims %" PRIu64 " points, but the chunk table has %" PRIu32
+                          " chunks of %" PRIu64,
                           f->declared, t->count, each);
         t->count = (uint32_t)chunks;
         t->places[chunks - 1].points = f->declared - (chunks - 1) * each;
         t->points = f->declared;
     } else if (f->declared != t->points) {
         mospt_err_set(f->damage, MOSPT_EFORMAT, mospt_at_file(f->file),
-                      "the header claims %" PRIu64 " points, the chunks hold %" PRIu64, f->declared, t->points);
+                      "the header claims %" PRIu64 " points, the chunks hold %" PRIu64, f->declared,
+                      t->points);
     }
 }
 
-/* Goes from head to head. What is behind the last chunk is none, but may look like one: the header says when to stop. */
+/* Goes from head to head. What is behind the last chunk is none, but may look like one: the header
+ * says when to stop. */
 static bool walk_layers(const finder *f, mospt_err *err)
 {
     prep_laz_table *t = f->table;
@@ -285,19 +312,22 @@ static bool find_without_table(const finder *f, mospt_err *err)
 {
     prep_laz_table *t = f->table;
     uint64_t each = f->format->chunk_points;
-    const char *loss = "the chunk table is missing or damaged; chunks are looked for one after the other";
+    const char *loss =
+        "the chunk table is missing or damaged; chunks are looked for one after the other";
     t->count = 0;
     t->points = 0;
     if (t->end == 0) t->end = f->file_size;
     if (f->format->compressor == PREP_LAZ_LAYER_CHUNKS) {
         if (!walk_layers(f, err)) return false;
     } else if (each != 0 && t->end - f->begin >= f->format->record_length) {
-        prep_laz_place first = {f->begin, t->end - f->begin, f->declared < each ? f->declared : each};
+        prep_laz_place first = {f->begin, t->end - f->begin,
+                                f->declared < each ? f->declared : each};
         if (!add_place(t, first, err)) return false;
         t->points = f->declared;
         t->is_open = true;
     } else if (each == 0) {
-        loss = "the chunk table is missing or damaged, and without it chunks of varying size cannot be told apart";
+        loss = "the chunk table is missing or damaged, and without it chunks of varying size "
+               "cannot be told apart";
     }
     mospt_where at = mospt_at_byte(f->file, f->begin - POINTER_SIZE);
     if (t->count == 0) return mospt_err_set(err, MOSPT_EFORMAT, at, "%s", loss);
@@ -310,9 +340,11 @@ static bool find_chunks(const finder *f, mospt_err *err)
     bool is_good;
     prep_laz_table *t = f->table;
     if (!read_table(f, &is_good, err)) return false;
-    if (!is_good && f->format->chunk_points == 0 && f->format->compressor == PREP_LAZ_ROW_CHUNKS && t->count > 0) {
+    if (!is_good && f->format->chunk_points == 0 && f->format->compressor == PREP_LAZ_ROW_CHUNKS &&
+        t->count > 0) {
         /* the entries that make sense are all there is to go by */
-        mospt_err_set(f->damage, MOSPT_EFORMAT, mospt_at_byte(f->file, t->end), "the chunk table is damaged");
+        mospt_err_set(f->damage, MOSPT_EFORMAT, mospt_at_byte(f->file, t->end),
+                      "the chunk table is damaged");
         return true;
     }
     if (!is_good) return find_without_table(f, err);
@@ -325,9 +357,14 @@ bool prep_laz_table_read(prep_input *input, const prep_las_header *h, const prep
 {
     prep_laz_table table = {0};
     bool is_chunked = format->compressor != PREP_LAZ_ROWS;
-    finder f = {.input = input, .format = format, .file = prep_input_path(input), .declared = h->declared,
-                .begin = h->data_offset + (is_chunked ? POINTER_SIZE : 0), .file_size = prep_input_size(input),
-                .table = &table, .damage = damage};
+    finder f = {.input = input,
+                .format = format,
+                .file = prep_input_path(input),
+                .declared = h->declared,
+                .begin = h->data_offset + (is_chunked ? POINTER_SIZE : 0),
+                .file_size = prep_input_size(input),
+                .table = &table,
+                .damage = damage};
     *damage = (mospt_err){0};
     if (f.begin > f.file_size || f.file_size - f.begin < format->record_length)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(f.file, f.file_size),
@@ -340,14 +377,13 @@ bool prep_laz_table_read(prep_input *input, const prep_las_header *h, const prep
         table.points = f.declared;
         ok = add_place(&table, (prep_laz_place){f.begin, f.file_size - f.begin, f.declared}, err);
     }
-    if (ok)
-        *out = table;
-    else
-        prep_laz_table_fini(&table);
+    if (ok) *out = table;
+    else prep_laz_table_fini(&table);
     return ok;
 }
 
-bool prep_laz_table_go_on(prep_laz_table *t, const prep_laz_format *format, uint64_t offset, mospt_err *err)
+bool prep_laz_table_go_on(prep_laz_table *t, const prep_laz_format *format, uint64_t offset,
+                          mospt_err *err)
 {
     uint64_t known = 0;
     prep_laz_place *last = &t->places[t->count - 1];
@@ -357,6 +393,7 @@ bool prep_laz_table_go_on(prep_laz_table *t, const prep_laz_format *format, uint
     known = (uint64_t)t->count * format->chunk_points;
     if (known >= t->points) return false;
     uint64_t rest = t->points - known;
-    prep_laz_place next = {offset, t->end - offset, rest < format->chunk_points ? rest : format->chunk_points};
+    prep_laz_place next = {offset, t->end - offset,
+                           rest < format->chunk_points ? rest : format->chunk_points};
     return add_place(t, next, err);
 }

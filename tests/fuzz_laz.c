@@ -17,7 +17,8 @@ static void look_at_some(prep_laz *laz, size_t length)
     uint32_t count = prep_laz_chunk_count(laz);
     size_t got;
     mospt_err err;
-    for (uint32_t i = 0; records != NULL && i < count && i < 4; i++) prep_laz_look(laz, count - 1 - i, records, 16, &got, &err);
+    for (uint32_t i = 0; records != NULL && i < count && i < 4; i++)
+        prep_laz_look(laz, count - 1 - i, records, 16, &got, &err);
     free(records);
 }
 
@@ -30,7 +31,8 @@ static void read_some(prep_laz *laz, size_t length)
     volatile uint32_t sum = 0;
     do {
         if (!prep_laz_read(laz, 5000, &records, &got, &err)) abort();
-        for (size_t i = 0; i < got * length; i++) sum += records[i];
+        for (size_t i = 0; i < got * length; i++)
+            sum += records[i];
         count += got;
     } while (got > 0 && count < POINTS_MAX);
     if (got == 0 && count < prep_laz_point_count(laz) && prep_laz_damage(laz) == NULL) abort();

@@ -23,7 +23,8 @@ typedef struct {
 /* Changes a value a little, now and then a lot, often not at all. */
 static uint32_t vary(uint64_t *seed, uint32_t value)
 {
-    uint32_t dice = scan_points_random(seed) % 64, r = scan_points_random(seed) << 1 ^ scan_points_random(seed);
+    uint32_t dice = scan_points_random(seed) % 64,
+             r = scan_points_random(seed) << 1 ^ scan_points_random(seed);
     if (dice == 0) return r;
     if (dice < 4) return value + (uint32_t)((int32_t)r >> 12);
     if (dice < 40) return value + r % 9 - 4;
@@ -61,7 +62,8 @@ static void make_colours(maker *m, uint8_t *p)
     if (at == 0) return;
     bool is_grey = one_in(&m->seed, 3);
     for (uint32_t c = 0; c < 3; c++)
-        write_las_u16(p + at + 2 * c, is_grey && c > 0 ? prep_le16(p + at) : vary(&m->seed, prep_le16(p + at + 2 * c)));
+        write_las_u16(p + at + 2 * c, is_grey && c > 0 ? prep_le16(p + at)
+                                                       : vary(&m->seed, prep_le16(p + at + 2 * c)));
     if (m->format >= 8) write_las_u16(p + 36, vary(&m->seed, prep_le16(p + 36)));
 }
 
@@ -77,13 +79,15 @@ static void make_wave(maker *m, uint8_t *p)
     if (dice == 5) offset = offset * 2654435761u + 12345;
     p[at] = (uint8_t)vary(&m->seed, p[at]);
     write_las_u64(p + at + 1, offset);
-    for (uint32_t k = 9; k < 29; k += 4) write_las_u32(p + at + k, vary(&m->seed, prep_le32(p + at + k)));
+    for (uint32_t k = 9; k < 29; k += 4)
+        write_las_u32(p + at + k, vary(&m->seed, prep_le32(p + at + k)));
 }
 
 static void make_point(maker *m, uint8_t *p)
 {
     bool is_new = m->format >= 6;
-    for (uint32_t k = 0; k < 12; k += 4) write_las_u32(p + k, vary(&m->seed, prep_le32(p + k)));
+    for (uint32_t k = 0; k < 12; k += 4)
+        write_las_u32(p + k, vary(&m->seed, prep_le32(p + k)));
     write_las_u16(p + 12, vary(&m->seed, prep_le16(p + 12)));
     if (one_in(&m->seed, 3)) p[14] = (uint8_t)scan_points_random(&m->seed);
     if (one_in(&m->seed, 3)) p[14] = is_new ? 0x11 : 9;
@@ -100,19 +104,26 @@ static void make_point(maker *m, uint8_t *p)
 static image make_las(uint8_t format, uint32_t count, uint32_t extra_size, uint64_t seed)
 {
     image las;
-    write_las_options o = {.minor = 4, .format = format, .count = count, .scale = {1, 1, 1}, .extra_size = extra_size,
-                           .rgb_step = 1, .intensity_step = 1};
+    write_las_options o = {.minor = 4,
+                           .format = format,
+                           .count = count,
+                           .scale = {1, 1, 1},
+                           .extra_size = extra_size,
+                           .rgb_step = 1,
+                           .intensity_step = 1};
     las.bytes = write_las(&o, &las.size);
     uint32_t begin = prep_le32(las.bytes + 96);
     maker m = {.seed = seed, .format = format, .length = prep_le16(las.bytes + 105)};
-    for (int i = 0; i < 6; i++) m.clocks[i] = 0x40f8000000000000u + (uint64_t)i * 0x1234567890u;
+    for (int i = 0; i < 6; i++)
+        m.clocks[i] = 0x40f8000000000000u + (uint64_t)i * 0x1234567890u;
     for (uint32_t i = 1; i < count; i++) {
         uint8_t *p = las.bytes + begin + (size_t)i * m.length;
         memcpy(p, p - m.length, m.length);
         make_point(&m, p);
         make_colours(&m, p);
         make_wave(&m, p);
-        for (uint32_t k = write_las_record_size(format); k < m.length; k++) p[k] = (uint8_t)vary(&m.seed, p[k]);
+        for (uint32_t k = write_las_record_size(format); k < m.length; k++)
+            p[k] = (uint8_t)vary(&m.seed, p[k]);
     }
     return las;
 }
@@ -139,7 +150,8 @@ static bool open_image(image file, uint32_t threads, opened *out, mospt_err *err
 {
     *out = (opened){0};
     const char *path = scan_points_file("a.laz", file.bytes, file.size);
-    if (prep_input_open(path, &out->input, err) && prep_las_header_read(out->input, &out->header, err) &&
+    if (prep_input_open(path, &out->input, err) &&
+        prep_las_header_read(out->input, &out->header, err) &&
         prep_laz_open(out->input, &out->header, threads, &out->laz, err))
         return true;
     prep_input_close(out->input);
@@ -152,8 +164,8 @@ static void close_image(opened *o)
     prep_input_close(o->input);
 }
 
-/* Reads all that comes, `most` at a time; returns how many were like those of the twin, which is less than `count` if one
- * was not. */
+/* Reads all that comes, `most` at a time; returns how many were like those of the twin, which is
+ * less than `count` if one was not. */
 static uint64_t read_like(opened *o, size_t most, image las, size_t compared, uint64_t *count)
 {
     uint64_t alike = 0;
@@ -167,7 +179,8 @@ static uint64_t read_like(opened *o, size_t most, image las, size_t compared, ui
         for (size_t i = 0; i < got; i++) {
             uint64_t n = *count + i;
             if (n * length >= las.size - prep_le32(las.bytes + 96)) continue;
-            bool same = memcmp(records + i * length, twin + n * length, compared < length ? compared : length) == 0;
+            bool same = memcmp(records + i * length, twin + n * length,
+                               compared < length ? compared : length) == 0;
             if (same && alike == n) alike++;
         }
     }
@@ -197,7 +210,8 @@ static void every_format_and_version_comes_back(void **state)
                 image laz = pack(las, (write_laz_options){.version = version, .chunk_points = 500});
                 check_same(las, laz, 1, 333);
                 free(laz.bytes);
-                laz = pack(las, (write_laz_options){.version = version, .compressor = format < 6 ? 1 : 3});
+                laz = pack(
+                    las, (write_laz_options){.version = version, .compressor = format < 6 ? 1 : 3});
                 check_same(las, laz, 1, 10000);
                 free(laz.bytes);
                 free(las.bytes);
@@ -235,7 +249,8 @@ static void chunks_of_every_kind_come_in_order(void **state)
         image las = make_las(format, COUNT, 2, format);
         for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++) {
             image laz = pack(las, kinds[k]);
-            for (uint32_t threads = 1; threads <= 5; threads += 2) check_same(las, laz, threads, 100);
+            for (uint32_t threads = 1; threads <= 5; threads += 2)
+                check_same(las, laz, threads, 100);
             free(laz.bytes);
         }
         free(las.bytes);
@@ -254,7 +269,8 @@ static void a_file_can_be_read_again_from_any_place(void **state)
         for (int part = 0; part < 5; part++) {
             const uint8_t *records;
             size_t got;
-            for (int i = 0; i < 90 * part; i++) assert_true(prep_laz_read(o.laz, 3, &records, &got, &err));
+            for (int i = 0; i < 90 * part; i++)
+                assert_true(prep_laz_read(o.laz, 3, &records, &got, &err));
             prep_laz_rewind(o.laz);
         }
         assert_int_equal(read_like(&o, 77, las, SIZE_MAX, &count), COUNT);
@@ -303,12 +319,16 @@ static void a_chunk_in_memory_is_decoded_alone(void **state)
         uint8_t *records = malloc(COUNT * length);
         assert_non_null(records);
         const prep_laz_format *f = prep_laz_format_of(o.laz);
-        assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, end - begin, COUNT, records, &got, &err));
+        assert_true(
+            prep_laz_chunk_decode(f, laz.bytes + begin, end - begin, COUNT, records, &got, &err));
         assert_int_equal(got, COUNT);
         assert_memory_equal(records, records_of(las), COUNT * length);
-        assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, (end - begin) / 2, COUNT, records, &got, &err));
-        assert_true(got > 0 && (got < COUNT || format > 5)); /* layers of x, y and z may be complete */
-        for (size_t i = 0; i < got; i++) assert_memory_equal(records + i * length, records_of(las) + i * length, 12);
+        assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, (end - begin) / 2, COUNT, records,
+                                          &got, &err));
+        assert_true(got > 0 &&
+                    (got < COUNT || format > 5)); /* layers of x, y and z may be complete */
+        for (size_t i = 0; i < got; i++)
+            assert_memory_equal(records + i * length, records_of(las) + i * length, 12);
         assert_true(prep_laz_chunk_decode(f, laz.bytes + begin, 3, COUNT, records, &got, &err));
         assert_int_equal(got, 0);
         free(records);
@@ -321,7 +341,8 @@ static void a_chunk_in_memory_is_decoded_alone(void **state)
 static void wave_packets_can_be_left_out_of_layers(void **state)
 {
     (void)state;
-    image las = make_las(10, COUNT, 4, 4), laz = pack(las, (write_laz_options){.chunk_points = 300});
+    image las = make_las(10, COUNT, 4, 4),
+          laz = pack(las, (write_laz_options){.chunk_points = 300});
     opened o;
     mospt_err err;
     const uint8_t *records;
@@ -364,11 +385,13 @@ static void check_without_table(image las, image laz)
 static void a_missing_or_bogus_table_costs_no_points(void **state)
 {
     (void)state;
-    static const uint64_t bogus[] = {0, 1, UINT64_MAX, UINT64_MAX - 1, UINT64_C(1) << 40, UINT64_C(1) << 63};
+    static const uint64_t bogus[] = {
+        0, 1, UINT64_MAX, UINT64_MAX - 1, UINT64_C(1) << 40, UINT64_C(1) << 63};
     for (uint8_t format = 2; format <= 8; format += 6) {
         image las = make_las(format, COUNT, 0, format);
         for (uint32_t each = 170; each <= 3000; each += 2000) {
-            image laz = pack(las, (write_laz_options){.chunk_points = each, .table = WRITE_LAZ_NO_TABLE});
+            image laz =
+                pack(las, (write_laz_options){.chunk_points = each, .table = WRITE_LAZ_NO_TABLE});
             check_without_table(las, laz);
             free(laz.bytes);
             laz = pack(las, (write_laz_options){.chunk_points = each});
@@ -394,7 +417,8 @@ static void rows_of_varying_chunks_need_their_table(void **state)
 {
     (void)state;
     image las = make_las(1, COUNT, 0, 1);
-    image laz = pack(las, (write_laz_options){.chunk_points = 100, .varies = true, .table = WRITE_LAZ_NO_TABLE});
+    image laz = pack(
+        las, (write_laz_options){.chunk_points = 100, .varies = true, .table = WRITE_LAZ_NO_TABLE});
     opened o;
     mospt_err err;
     assert_false(open_image(laz, 1, &o, &err));
@@ -429,8 +453,10 @@ static void every_truncation_keeps_what_is_there(void **state)
         image las = make_las(format, COUNT, 1, 9);
         for (uint32_t each = 0; each <= 400; each += 400) {
             image laz = pack(las, (write_laz_options){.chunk_points = each});
-            for (size_t size = 0; size < laz.size; size += size % 41 == 0 ? 1 : 37) check_cut(las, laz, size);
-            for (size_t size = laz.size - 40; size < laz.size; size++) check_cut(las, laz, size);
+            for (size_t size = 0; size < laz.size; size += size % 41 == 0 ? 1 : 37)
+                check_cut(las, laz, size);
+            for (size_t size = laz.size - 40; size < laz.size; size++)
+                check_cut(las, laz, size);
             free(laz.bytes);
         }
         free(las.bytes);
@@ -452,7 +478,8 @@ static void check_survives(image laz, uint32_t threads, uint64_t most)
     uint64_t count = 0, sum = 0;
     do {
         assert_true(prep_laz_read(o.laz, 1000, &records, &got, &err));
-        for (size_t i = 0; i < got * o.header.record_length; i++) sum += records[i];
+        for (size_t i = 0; i < got * o.header.record_length; i++)
+            sum += records[i];
         count += got;
         assert_true(count <= most);
     } while (got > 0);
@@ -465,7 +492,8 @@ static void every_header_byte_may_lie(void **state)
     (void)state;
     static const uint8_t values[] = {0, 1, 127, 255};
     for (uint8_t format = 1; format <= 7; format += 6) {
-        image las = make_las(format, 120, 1, 5), laz = pack(las, (write_laz_options){.chunk_points = 50});
+        image las = make_las(format, 120, 1, 5),
+              laz = pack(las, (write_laz_options){.chunk_points = 50});
         size_t end = prep_le32(laz.bytes + 96) + 8, record = prep_le16(laz.bytes + 94);
         for (size_t at = 94; at < end; at++) {
             if (at == 111) at = 247; /* what is between does not matter here */
@@ -488,7 +516,8 @@ static void flipped_bits_lose_no_more_than_they_must(void **state)
     uint64_t seed = 11;
     for (uint8_t format = 0; format <= 10; format++) {
         image las = make_las(format, COUNT, 2, format);
-        image laz = pack(las, (write_laz_options){.chunk_points = 200, .version = format == 4 ? 1 : 0});
+        image laz =
+            pack(las, (write_laz_options){.chunk_points = 200, .version = format == 4 ? 1 : 0});
         size_t begin = prep_le32(laz.bytes + 96);
         for (int k = 0; k < 60; k++) {
             size_t at = begin + scan_points_random(&seed) % (laz.size - begin);
@@ -509,7 +538,8 @@ static void hostile_counts_end_with_the_bytes(void **state)
     for (uint8_t format = 0; format <= 6; format += 6) {
         image las = make_las(format, 300, 0, 6);
         for (uint32_t each = 0; each <= 100; each += 100) {
-            image laz = pack(las, (write_laz_options){.chunk_points = each, .table = WRITE_LAZ_NO_TABLE});
+            image laz =
+                pack(las, (write_laz_options){.chunk_points = each, .table = WRITE_LAZ_NO_TABLE});
             size_t vlr = prep_le16(laz.bytes + 94) + 54;
             write_las_u32(laz.bytes + 107, format == 0 ? 4000000000u : 0);
             write_las_u64(laz.bytes + 247, format == 0 ? 4000000000u : UINT64_C(1) << 60);
@@ -528,7 +558,8 @@ static void what_is_not_known_is_refused_with_its_place(void **state)
     static const struct {
         uint32_t at; /* byte in the payload of the record */
         uint8_t value;
-    } changes[] = {{0, 0}, {0, 4}, {0, 3}, {2, 1}, {32, 1}, {32, 200}, {34, 7}, {36, 21}, {38, 3}, {38, 0}, {44, 1}};
+    } changes[] = {{0, 0},  {0, 4},   {0, 3},  {2, 1},  {32, 1}, {32, 200},
+                   {34, 7}, {36, 21}, {38, 3}, {38, 0}, {44, 1}};
     image las = make_las(3, 10, 0, 5), laz = pack(las, (write_laz_options){0});
     size_t record = prep_le16(laz.bytes + 94) + 54;
     for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++) {
@@ -556,7 +587,8 @@ static void check_same_points(const scan_points *a, const scan_points *b)
     assert_memory_equal(a->xyz, b->xyz, a->count * 3 * sizeof *a->xyz);
     assert_int_equal(a->info.attributes.count, b->info.attributes.count);
     for (uint32_t k = 0; k < a->info.attributes.count; k++)
-        assert_memory_equal(a->plane[k], b->plane[k], a->count * mospt_attribute_size(&a->info.attributes.at[k]));
+        assert_memory_equal(a->plane[k], b->plane[k],
+                            a->count * mospt_attribute_size(&a->info.attributes.at[k]));
     assert_int_equal(a->info.has_rgb, b->info.has_rgb);
     assert_false(a->is_damaged || b->is_damaged);
 }
@@ -565,12 +597,14 @@ static void a_scan_reads_like_its_uncompressed_twin(void **state)
 {
     (void)state;
     for (uint8_t format = 0; format <= 10; format++) {
-        image las = make_las(format, COUNT, 3, format), laz = pack(las, (write_laz_options){.chunk_points = 350});
+        image las = make_las(format, COUNT, 3, format),
+              laz = pack(las, (write_laz_options){.chunk_points = 350});
         scan_points a, b;
         mospt_err err;
         if (!scan_points_read(scan_points_file("a.laz", laz.bytes, laz.size), NULL, 100, &a, &err))
             fail_msg("%s", err.message);
-        assert_true(scan_points_read(scan_points_file("a.las", las.bytes, las.size), NULL, 100, &b, &err));
+        assert_true(
+            scan_points_read(scan_points_file("a.las", las.bytes, las.size), NULL, 100, &b, &err));
         check_same_points(&a, &b);
         scan_points_fini(&a);
         scan_points_fini(&b);
@@ -627,7 +661,8 @@ static void real_files_read_like_their_twins(void **state)
             assert_true(fread(file[k].bytes, 1, file[k].size, f) == file[k].size);
             fclose(f);
         }
-        for (uint32_t threads = 1; threads <= 3; threads += 2) check_same(file[1], file[0], threads, 1000);
+        for (uint32_t threads = 1; threads <= 3; threads += 2)
+            check_same(file[1], file[0], threads, 1000);
         free(file[0].bytes);
         free(file[1].bytes);
     }

@@ -41,7 +41,8 @@ static model *all_models;
 static void distribute(model *m)
 {
     uint32_t sum = 0, scale = 0x80000000u / m->total;
-    for (uint32_t i = 0; i < m->symbols; sum += m->count[i++]) m->low[i] = scale * sum >> 16;
+    for (uint32_t i = 0; i < m->symbols; sum += m->count[i++])
+        m->low[i] = scale * sum >> 16;
 }
 
 static model *make_model(uint32_t symbols)
@@ -52,7 +53,8 @@ static model *make_model(uint32_t symbols)
     all_models = m;
     m->symbols = m->total = symbols;
     m->cycle = m->left = (symbols + 6) / 2;
-    for (uint32_t i = 0; i < symbols; i++) m->count[i] = 1;
+    for (uint32_t i = 0; i < symbols; i++)
+        m->count[i] = 1;
     distribute(m);
     return m;
 }
@@ -85,7 +87,8 @@ static void raise_base(coder *c, uint32_t by)
     uint32_t base = c->base + by;
     if (base < by) {
         size_t i = c->out.size;
-        while (c->out.p[--i] == 255) c->out.p[i] = 0;
+        while (c->out.p[--i] == 255)
+            c->out.p[i] = 0;
         c->out.p[i]++;
     }
     c->base = base;
@@ -122,7 +125,8 @@ static void put_symbol(coder *c, model **slot, uint32_t symbols, uint32_t symbol
     m->total += m->cycle;
     if (m->total > 32768) {
         m->total = 0;
-        for (uint32_t i = 0; i < symbols; i++) m->total += m->count[i] = (m->count[i] + 1) / 2;
+        for (uint32_t i = 0; i < symbols; i++)
+            m->total += m->count[i] = (m->count[i] + 1) / 2;
     }
     distribute(m);
     m->cycle = 5 * m->cycle / 4 < 8 * (symbols + 6) ? 5 * m->cycle / 4 : 8 * (symbols + 6);
@@ -180,7 +184,8 @@ static void put_one_bit(coder *c, integer *n, uint32_t bit)
     n->cycle = n->left = 5 * n->cycle / 4 < 64 ? 5 * n->cycle / 4 : 64;
 }
 
-static void put_integer(coder *c, integer *n, uint32_t bits, model **context, uint32_t predicted, uint32_t real)
+static void put_integer(coder *c, integer *n, uint32_t bits, model **context, uint32_t predicted,
+                        uint32_t real)
 {
     int64_t correction = (int32_t)(real - predicted);
     if (bits < 32) {
@@ -189,11 +194,13 @@ static void put_integer(coder *c, integer *n, uint32_t bits, model **context, ui
         if (correction >= range / 2) correction -= range;
     }
     uint64_t size = (uint64_t)(correction <= 0 ? -correction : correction - 1);
-    for (n->k = 0; size >> n->k != 0;) n->k++;
+    for (n->k = 0; size >> n->k != 0;)
+        n->k++;
     put_symbol(c, context, bits + 1, n->k);
     if (n->k == 0) put_one_bit(c, n, (uint32_t)correction);
     if (n->k == 0 || n->k == 32) return;
-    uint32_t code = (uint32_t)(correction < 0 ? correction + (INT64_C(1) << n->k) - 1 : correction - 1);
+    uint32_t code =
+        (uint32_t)(correction < 0 ? correction + (INT64_C(1) << n->k) - 1 : correction - 1);
     uint32_t low = n->k > 8 ? n->k - 8 : 0;
     put_symbol(c, &n->value[n->k], 1u << (n->k - low), code >> low);
     if (low > 0) put_bits(c, low, code & ((1u << low) - 1));
@@ -208,14 +215,16 @@ typedef struct {
 static void add_median(median *m, int32_t x)
 {
     int32_t *v = m->v, mirrored[5];
-    for (int i = 0; i < 5 && m->low; i++) mirrored[i] = ~v[4 - i];
+    for (int i = 0; i < 5 && m->low; i++)
+        mirrored[i] = ~v[4 - i];
     if (m->low) v = mirrored, x = ~x;
     bool is_below = x < v[2];
     if (is_below) {
         v[4] = v[3];
         v[3] = v[2];
         int at = 2;
-        for (; at > 0 && x < v[at - 1]; at--) v[at] = v[at - 1];
+        for (; at > 0 && x < v[at - 1]; at--)
+            v[at] = v[at - 1];
         v[at] = x;
     } else if (x < v[3]) {
         v[4] = v[3];
@@ -223,7 +232,8 @@ static void add_median(median *m, int32_t x)
     } else {
         v[4] = x;
     }
-    for (int i = 0; i < 5 && m->low; i++) m->v[i] = ~mirrored[4 - i];
+    for (int i = 0; i < 5 && m->low; i++)
+        m->v[i] = ~mirrored[4 - i];
     if (!is_below) m->low = !m->low;
 }
 
@@ -273,7 +283,8 @@ static void put_gps(coder *c, gps_state *g, uint64_t time, bool has_same)
             put_gps(c, g, time, has_same);
             return;
         }
-        put_integer(c, &g->n, 32, &g->context[8], (uint32_t)(g->time[i] >> 32), (uint32_t)(time >> 32));
+        put_integer(c, &g->n, 32, &g->context[8], (uint32_t)(g->time[i] >> 32),
+                    (uint32_t)(time >> 32));
         put_bits(c, 32, (uint32_t)time);
         g->newest = g->at = (g->newest + 1) & 3;
         g->step[g->at] = g->extremes[g->at] = 0;
@@ -288,9 +299,16 @@ static void put_gps(coder *c, gps_state *g, uint64_t time, bool has_same)
         if (times > 500) multi = 500;
         if (times < -10) multi = -10;
         sym = multi >= 0 ? (uint32_t)multi : (uint32_t)(500 - multi);
-        uint32_t context = multi == 1 ? 1 : multi == 0 ? 7 : multi < -9 ? 6 : multi < 0 ? 5 : multi < 10 ? 2 : multi < 500 ? 3 : 4;
+        uint32_t context = multi == 1    ? 1
+                           : multi == 0  ? 7
+                           : multi < -9  ? 6
+                           : multi < 0   ? 5
+                           : multi < 10  ? 2
+                           : multi < 500 ? 3
+                                         : 4;
         put_symbol(c, slot, symbols, sym);
-        put_integer(c, &g->n, 32, &g->context[context], (uint32_t)multi * (uint32_t)step, (uint32_t)delta);
+        put_integer(c, &g->n, 32, &g->context[context], (uint32_t)multi * (uint32_t)step,
+                    (uint32_t)delta);
         if (multi == 1) g->extremes[i] = 0;
         if (multi == 0 || multi == 500 || multi == -10) doubt(g, delta);
     }
@@ -314,7 +332,12 @@ static void put_old_gps(coder *c, gps_state *g, uint64_t time)
         uint32_t multi = times >= 508.5 ? 509 : times < 0.5 ? 0 : (uint32_t)(times + 0.5);
         uint32_t predicted = multi == 0 ? (uint32_t)(step / 4) : multi * (uint32_t)step;
         put_symbol(c, &g->multiple, 512, multi);
-        put_integer(c, &g->n, 32, &g->context[multi == 1 ? 1 : multi == 0 ? 2 : multi < 10 ? 3 : multi < 50 ? 4 : 5],
+        put_integer(c, &g->n, 32,
+                    &g->context[multi == 1   ? 1
+                                : multi == 0 ? 2
+                                : multi < 10 ? 3
+                                : multi < 50 ? 4
+                                             : 5],
                     predicted, (uint32_t)delta);
         if (multi == 1) g->step[0] = delta, g->extremes[0] = 0;
         if (multi == 0 || multi == 509) doubt(g, delta);
@@ -340,7 +363,8 @@ static void put_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *
 {
     static const uint8_t order[6] = {0, 1, 2, 4, 3, 5};
     uint32_t changed = 0;
-    for (uint32_t i = 0; i < 6; i++) changed |= (uint32_t)(last[i] != p[i]) << i;
+    for (uint32_t i = 0; i < 6; i++)
+        changed |= (uint32_t)(last[i] != p[i]) << i;
     bool is_grey = p[0] == p[2] && p[0] == p[4] && p[1] == p[3] && p[1] == p[5];
     if (!is_grey) changed |= 64;
     put_symbol(c, &s->changed, 128, changed);
@@ -357,7 +381,8 @@ static void put_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *
 static void put_old_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *p)
 {
     uint32_t changed = 0;
-    for (uint32_t i = 0; i < 6; i++) changed |= (uint32_t)(last[i] != p[i]) << i;
+    for (uint32_t i = 0; i < 6; i++)
+        changed |= (uint32_t)(last[i] != p[i]) << i;
     put_symbol(c, &s->changed, 64, changed);
     for (uint32_t i = 0; i < 6; i++) {
         if (changed >> i & 1) put_integer(c, &s->n, 8, &s->context[i], last[i], p[i]);
@@ -373,16 +398,22 @@ typedef struct {
 static void put_wave(coder *c, wave_state *w, const uint8_t *last, const uint8_t *p)
 {
     uint64_t move = prep_le64(p + 1) - prep_le64(last + 1);
-    uint32_t how = move == 0 ? 0 : move == prep_le32(last + 9) ? 1 : (int64_t)move == (int32_t)move ? 2 : 3;
+    uint32_t how = move == 0                        ? 0
+                   : move == prep_le32(last + 9)    ? 1
+                   : (int64_t)move == (int32_t)move ? 2
+                                                    : 3;
     put_symbol(c, &w->index, 256, p[0]);
     put_symbol(c, &w->how[w->how_last], 4, how);
     w->how_last = how;
-    if (how == 2) put_integer(c, &w->offset, 32, &w->context[0], w->step, (uint32_t)move), w->step = (uint32_t)move;
+    if (how == 2)
+        put_integer(c, &w->offset, 32, &w->context[0], w->step, (uint32_t)move),
+            w->step = (uint32_t)move;
     if (how == 3) put_bits_64(c, prep_le64(p + 1));
     put_integer(c, &w->size, 32, &w->context[1], prep_le32(last + 9), prep_le32(p + 9));
     put_integer(c, &w->location, 32, &w->context[2], prep_le32(last + 13), prep_le32(p + 13));
     for (uint32_t a = 0; a < 3; a++)
-        put_integer(c, &w->xyz, 32, &w->context[3 + a], prep_le32(last + 17 + 4 * a), prep_le32(p + 17 + 4 * a));
+        put_integer(c, &w->xyz, 32, &w->context[3 + a], prep_le32(last + 17 + 4 * a),
+                    prep_le32(p + 17 + 4 * a));
 }
 
 /* Where the parts of a record are. */
@@ -397,7 +428,8 @@ static parts parts_of(uint8_t format, uint32_t length)
     static const uint8_t nir[11] = {0, 0, 0, 0, 0, 0, 0, 0, 36, 0, 36};
     static const uint8_t wave[11] = {0, 0, 0, 0, 28, 34, 0, 0, 0, 30, 38};
     uint16_t size = write_las_record_size(format);
-    return (parts){length, gps[format], rgb[format], nir[format], wave[format], size, length - size};
+    return (parts){length,       gps[format], rgb[format],  nir[format],
+                   wave[format], size,        length - size};
 }
 
 static uint32_t even(uint32_t k, uint32_t most)
@@ -407,10 +439,11 @@ static uint32_t even(uint32_t k, uint32_t most)
 
 /* ---- point formats 0 to 5 ---- */
 
-static const uint8_t map_8[8][8] = {{15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},
-                                    {13, 1, 2, 4, 7, 11, 11, 10},    {12, 3, 4, 5, 8, 12, 12, 11},
-                                    {11, 6, 7, 8, 9, 13, 13, 12},    {10, 10, 11, 12, 13, 14, 14, 13},
-                                    {9, 10, 11, 12, 13, 14, 15, 14}, {8, 9, 10, 11, 12, 13, 14, 15}};
+static const uint8_t map_8[8][8] = {
+    {15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},
+    {13, 1, 2, 4, 7, 11, 11, 10},    {12, 3, 4, 5, 8, 12, 12, 11},
+    {11, 6, 7, 8, 9, 13, 13, 12},    {10, 10, 11, 12, 13, 14, 14, 13},
+    {9, 10, 11, 12, 13, 14, 15, 14}, {8, 9, 10, 11, 12, 13, 14, 15}};
 
 typedef struct {
     int32_t dx[3], dy[3];
@@ -428,11 +461,13 @@ typedef struct {
     model *extra_model[4096];
 } rows_state;
 
-static uint32_t changes(const uint8_t *last, const uint8_t *p, bool has_intensity, bool intensity_first)
+static uint32_t changes(const uint8_t *last, const uint8_t *p, bool has_intensity,
+                        bool intensity_first)
 {
     uint32_t bits = (uint32_t)has_intensity << (intensity_first ? 5 : 4);
     bits |= (uint32_t)(p[14] != last[14]) << (intensity_first ? 4 : 5);
-    bits |= (uint32_t)(p[15] != last[15]) << 3 | (uint32_t)(p[16] != last[16]) << 2 | (uint32_t)(p[17] != last[17]) << 1;
+    bits |= (uint32_t)(p[15] != last[15]) << 3 | (uint32_t)(p[16] != last[16]) << 2 |
+            (uint32_t)(p[17] != last[17]) << 1;
     return bits | (memcmp(p + 18, last + 18, 2) != 0);
 }
 
@@ -446,10 +481,12 @@ static void put_point(coder *c, rows_state *s, const uint8_t *last, const uint8_
     if (changed & 16) put_integer(c, &s->i, 16, &s->ci[m < 3 ? m : 3], s->intensity[m], intensity);
     s->intensity[m] = intensity;
     if (changed & 8) put_symbol(c, &s->class[last[15]], 256, p[15]);
-    if (changed & 4) put_symbol(c, &s->angle[p[14] >> 6 & 1], 256, (uint32_t)(p[16] - last[16]) & 255);
+    if (changed & 4)
+        put_symbol(c, &s->angle[p[14] >> 6 & 1], 256, (uint32_t)(p[16] - last[16]) & 255);
     if (changed & 2) put_symbol(c, &s->user[last[17]], 256, p[17]);
     if (changed & 1) put_integer(c, &s->s, 16, &s->cs, prep_le16(last + 18), prep_le16(p + 18));
-    uint32_t dx = prep_le32(p) - prep_le32(last), dy = prep_le32(p + 4) - prep_le32(last + 4), z = prep_le32(p + 8);
+    uint32_t dx = prep_le32(p) - prep_le32(last), dy = prep_le32(p + 4) - prep_le32(last + 4),
+             z = prep_le32(p + 8);
     put_integer(c, &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
     put_integer(c, &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2], dy);
     put_integer(c, &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)], s->height[l], z);
@@ -503,10 +540,8 @@ static void put_rows(bytes *out, const parts *f, const uint8_t *records, size_t 
         if (f->wave) put_wave(&c, &s->wave, last + f->wave, p + f->wave);
         for (uint32_t k = 0; k < f->extra_size; k++) {
             uint8_t a = last[f->extra + k], b = p[f->extra + k];
-            if (is_old)
-                put_integer(&c, &s->extra, 8, &s->extra_model[k], a, b);
-            else
-                put_symbol(&c, &s->extra_model[k], 256, (uint32_t)(b - a) & 255);
+            if (is_old) put_integer(&c, &s->extra, 8, &s->extra_model[k], a, b);
+            else put_symbol(&c, &s->extra_model[k], 256, (uint32_t)(b - a) & 255);
         }
     }
     end_coder(&c);
@@ -518,12 +553,39 @@ static void put_rows(bytes *out, const parts *f, const uint8_t *records, size_t 
 
 /* ---- point formats 6 to 10 ---- */
 
-static const char map_6[] = "0123453445555555" "1013333333333333" "2124444444433333" "3345444444444444"
-                            "4344544444444444" "5344454444444444" "3344445444444444" "4344444544444444"
-                            "4344444454444444" "5344444445444444" "5344444444544444" "5334444444455444"
-                            "5334444444455544" "5334444444445554" "5334444444444555" "5334444444444455";
+static const char map_6[] = "0123453445555555"
+                            "1013333333333333"
+                            "2124444444433333"
+                            "3345444444444444"
+                            "4344544444444444"
+                            "5344454444444444"
+                            "3344445444444444"
+                            "4344444544444444"
+                            "4344444454444444"
+                            "5344444445444444"
+                            "5344444444544444"
+                            "5334444444455444"
+                            "5334444444455544"
+                            "5334444444445554"
+                            "5334444444444555"
+                            "5334444444444455";
 
-enum { XY, Z, CLASS, FLAGS, INTENSITY, ANGLE, USER, SOURCE, GPS, RGB, NIR, WAVE, EXTRA, LAYERS = EXTRA + 4096 };
+enum {
+    XY,
+    Z,
+    CLASS,
+    FLAGS,
+    INTENSITY,
+    ANGLE,
+    USER,
+    SOURCE,
+    GPS,
+    RGB,
+    NIR,
+    WAVE,
+    EXTRA,
+    LAYERS = EXTRA + 4096
+};
 
 typedef struct {
     bool is_used, item_is_used, had_new_time;
@@ -531,7 +593,8 @@ typedef struct {
     median mx[12], my[12];
     uint32_t height[8];
     uint16_t intensity[8];
-    model *changed[8], *channel, *n[16], *r[16], *r_same, *cx[2], *cy[22], *cz[20], *class[64], *flags[64], *user[64];
+    model *changed[8], *channel, *n[16], *r[16], *r_same, *cx[2], *cy[22], *cz[20], *class[64],
+        *flags[64], *user[64];
     model *ci[4], *ca[2], *cs;
     integer x, y, z, i, a, s;
     gps_state gps;
@@ -565,15 +628,13 @@ static void use_channel(channel_state *s, const uint8_t *first)
     s->gps.time[0] = prep_le64(first + 22);
 }
 
-static void put_returns(coder *c, channel_state *s, uint32_t last_n, uint32_t last_r, uint32_t n, uint32_t r,
-                        uint32_t changed)
+static void put_returns(coder *c, channel_state *s, uint32_t last_n, uint32_t last_r, uint32_t n,
+                        uint32_t r, uint32_t changed)
 {
     if (changed & 4) put_symbol(c, &s->n[last_n], 16, n);
     if ((changed & 3) != 3) return;
-    if (changed & 16)
-        put_symbol(c, &s->r[last_r], 16, r);
-    else
-        put_symbol(c, &s->r_same, 13, (r + 16 - last_r) % 16 - 2);
+    if (changed & 16) put_symbol(c, &s->r[last_r], 16, r);
+    else put_symbol(c, &s->r_same, 13, (r + 16 - last_r) % 16 - 2);
 }
 
 static void put_layers_point(layers_state *w, const uint8_t *p)
@@ -585,11 +646,17 @@ static void put_layers_point(layers_state *w, const uint8_t *p)
     channel_state *s = &w->ch[channel];
     if (!s->is_used) use_channel(s, from->last);
     const uint8_t *last = s->last;
-    uint32_t last_r = last[14] & 15, last_n = last[14] >> 4, r = p[14] & 15, n = p[14] >> 4, by = (r + 16 - last_r) % 16;
+    uint32_t last_r = last[14] & 15, last_n = last[14] >> 4, r = p[14] & 15, n = p[14] >> 4,
+             by = (r + 16 - last_r) % 16;
     bool new_time = memcmp(p + 22, last + 22, 8) != 0;
-    uint32_t changed = (by == 0 ? 0 : by == 1 ? 1 : by == 15 ? 2 : 3) | (uint32_t)(n != last_n) << 2 |
-                       (uint32_t)(memcmp(p + 18, last + 18, 2) != 0) << 3 | (uint32_t)new_time << 4 |
-                       (uint32_t)(memcmp(p + 20, last + 20, 2) != 0) << 5 | (uint32_t)(channel != w->channel) << 6;
+    uint32_t changed =
+        (by == 0    ? 0
+         : by == 1  ? 1
+         : by == 15 ? 2
+                    : 3) |
+        (uint32_t)(n != last_n) << 2 | (uint32_t)(memcmp(p + 18, last + 18, 2) != 0) << 3 |
+        (uint32_t)new_time << 4 | (uint32_t)(memcmp(p + 20, last + 20, 2) != 0) << 5 |
+        (uint32_t)(channel != w->channel) << 6;
     put_symbol(&c[XY], &from->changed[context], 128, changed);
     if (changed & 64) put_symbol(&c[XY], &from->channel, 3, (channel + 4 - w->channel) % 4 - 1);
     put_returns(&c[XY], s, last_n, last_r, n, r, changed);
@@ -599,18 +666,24 @@ static void put_layers_point(layers_state *w, const uint8_t *p)
     uint32_t dy = prep_le32(p + 4) - prep_le32(last + 4), z = prep_le32(p + 8);
     if (l > 7) l = 7;
     put_integer(&c[XY], &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
-    put_integer(&c[XY], &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2], dy);
+    put_integer(&c[XY], &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2],
+                dy);
     add_median(&s->mx[m], (int32_t)dx);
     add_median(&s->my[m], (int32_t)dy);
-    put_integer(&c[Z], &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)], s->height[l], z);
+    put_integer(&c[Z], &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)], s->height[l],
+                z);
     s->height[l] = z;
     put_symbol(&c[CLASS], &s->class[(last[16] & 31) * 2 + (ends == 3)], 256, p[16]);
     put_symbol(&c[FLAGS], &s->flags[flags_of(last)], 64, flags_of(p));
-    put_integer(&c[INTENSITY], &s->i, 16, &s->ci[ends], s->intensity[ends << 1 | new_time], prep_le16(p + 12));
+    put_integer(&c[INTENSITY], &s->i, 16, &s->ci[ends], s->intensity[ends << 1 | new_time],
+                prep_le16(p + 12));
     s->intensity[ends << 1 | new_time] = prep_le16(p + 12);
-    if (changed & 8) put_integer(&c[ANGLE], &s->a, 16, &s->ca[new_time], prep_le16(last + 18), prep_le16(p + 18));
+    if (changed & 8)
+        put_integer(&c[ANGLE], &s->a, 16, &s->ca[new_time], prep_le16(last + 18),
+                    prep_le16(p + 18));
     put_symbol(&c[USER], &s->user[last[17] / 4], 256, p[17]);
-    if (changed & 32) put_integer(&c[SOURCE], &s->s, 16, &s->cs, prep_le16(last + 20), prep_le16(p + 20));
+    if (changed & 32)
+        put_integer(&c[SOURCE], &s->s, 16, &s->cs, prep_le16(last + 20), prep_le16(p + 20));
     if (new_time) put_gps(&c[GPS], &s->gps, prep_le64(p + 22), false);
 
     c[Z].is_needed |= z != prep_le32(last + 8);
@@ -647,7 +720,9 @@ static void put_layers_items(layers_state *w, const uint8_t *p, bool has_changed
         uint32_t low = last[f->nir] != p[f->nir], high = last[f->nir + 1] != p[f->nir + 1];
         put_symbol(&c[NIR], &s->nir_changed, 4, low | high << 1);
         if (low) put_symbol(&c[NIR], &s->nir[0], 256, (uint32_t)(p[f->nir] - last[f->nir]) & 255);
-        if (high) put_symbol(&c[NIR], &s->nir[1], 256, (uint32_t)(p[f->nir + 1] - last[f->nir + 1]) & 255);
+        if (high)
+            put_symbol(&c[NIR], &s->nir[1], 256,
+                       (uint32_t)(p[f->nir + 1] - last[f->nir + 1]) & 255);
         c[NIR].is_needed |= low || high;
     }
     if (f->wave) {
@@ -678,7 +753,8 @@ static void put_layers(bytes *out, const parts *f, const uint8_t *records, size_
     use_channel(&w->ch[w->channel], records);
     w->ch[w->channel].item_is_used = true;
     memcpy(w->ch[w->channel].item_last, records, f->length);
-    for (uint32_t k = 0; k < LAYERS; k++) begin_coder(&w->c[k]);
+    for (uint32_t k = 0; k < LAYERS; k++)
+        begin_coder(&w->c[k]);
     for (size_t i = 1; i < count; i++) {
         uint32_t before = w->channel;
         put_layers_point(w, records + i * f->length);
@@ -724,7 +800,8 @@ static void put_table(bytes *out, const entry *entries, uint32_t count, bool var
     free_models();
 }
 
-static size_t put_description(bytes *out, const write_laz_options *o, const parts *f, uint8_t format, uint32_t points)
+static size_t put_description(bytes *out, const write_laz_options *o, const parts *f,
+                              uint8_t format, uint32_t points)
 {
     uint8_t p[54 + 34 + 5 * 6] = {0};
     uint8_t *q = p + 54, *item = q + 34;
@@ -752,7 +829,8 @@ static size_t put_description(bytes *out, const write_laz_options *o, const part
     return 54 + 34 + 6u * n;
 }
 
-uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options *options, size_t *size)
+uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options *options,
+                   size_t *size)
 {
     uint8_t format = las[104];
     write_laz_options o = *options;
@@ -781,20 +859,16 @@ uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options 
         uint32_t n = o.compressor == 1 ? count : o.varies ? each * (chunks % 4 + 1) : each;
         if (n > count - first) n = count - first;
         size_t before = out.size;
-        if (format < 6)
-            put_rows(&out, &f, las + begin + (size_t)first * length, n, o.version == 1);
-        else
-            put_layers(&out, &f, las + begin + (size_t)first * length, n, o.version == 4);
+        if (format < 6) put_rows(&out, &f, las + begin + (size_t)first * length, n, o.version == 1);
+        else put_layers(&out, &f, las + begin + (size_t)first * length, n, o.version == 4);
         entries[chunks] = (entry){n, (uint32_t)(out.size - before)};
         first += n;
     }
     write_las_u64(word, out.size);
     if (o.compressor > 1 && o.table != WRITE_LAZ_NO_TABLE) {
         put_table(&out, entries, chunks, o.varies);
-        if (o.table == WRITE_LAZ_TABLE)
-            memcpy(out.p + pointer, word, 8);
-        else
-            append(&out, word, 8);
+        if (o.table == WRITE_LAZ_TABLE) memcpy(out.p + pointer, word, 8);
+        else append(&out, word, 8);
     }
     free(entries);
     *size = out.size;

@@ -1,7 +1,8 @@
-/* tests/write_laz.h - LAZ files of every compressor, item and version, packed from the bytes of a LAS file.
+/* tests/write_laz.h - LAZ files of every compressor, item and version, packed from the bytes of a
+ * LAS file.
  *
- * A plain twin of the decoder, for what no file made by another program covers. It takes the same decisions as the
- * original writer, and adapts its models by the book rather than fast. */
+ * A plain twin of the decoder, for what no file made by another program covers. It takes the same
+ * decisions as the original writer, and adapts its models by the book rather than fast. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -16,4 +17,5 @@ typedef struct {
 } write_laz_options;
 
 /* Packs a LAS file; returns the bytes of a LAZ file, freed by the caller. */
-uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options *options, size_t *size);
+uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options *options,
+                   size_t *size);
