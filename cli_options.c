@@ -84,6 +84,8 @@ static bool read_triple(const char *text, double out[3])
 static bool o_output(cli_options *o, const char *v) { return (o->output = v)[0] != '\0'; }
 static bool o_temp_dir(cli_options *o, const char *v) { return (o->temp_dir = v)[0] != '\0'; }
 static bool o_columns(cli_options *o, const char *v) { return (o->columns = v)[0] != '\0'; }
+static bool o_poses(cli_options *o, const char *v) { return (o->poses = v)[0] != '\0'; }
+static bool o_crs(cli_options *o, const char *v) { return (o->crs = v)[0] != '\0'; }
 static bool o_screenshot(cli_options *o, const char *v) { return (o->screenshot = v)[0] != '\0'; }
 static bool o_json(cli_options *o, const char *v) { return (void)v, o->json = true; }
 static bool o_stats(cli_options *o, const char *v) { return (void)v, o->stats = true; }
@@ -101,6 +103,15 @@ static bool o_gpu(cli_options *o, const char *v) { return read_amount(v, 1024, &
 static bool o_eye(cli_options *o, const char *v) { return o->camera.has_eye = read_triple(v, o->camera.eye); }
 static bool o_target(cli_options *o, const char *v) { return o->camera.has_target = read_triple(v, o->camera.target); }
 static bool o_fov(cli_options *o, const char *v) { return o->camera.has_fov = read_real(v, 1, 170, &o->camera.fov_deg); }
+
+static bool o_crop(cli_options *o, const char *v)
+{
+    double *c = o->crop;
+    int used = 0;
+    o->has_crop = sscanf(v, "%lf,%lf,%lf,%lf,%lf,%lf%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5], &used) == 6 &&
+                  v[used] == '\0' && c[0] <= c[3] && c[1] <= c[4] && c[2] <= c[5];
+    return o->has_crop;
+}
 
 static bool o_budget(cli_options *o, const char *v)
 {
@@ -179,6 +190,9 @@ static const struct {
     {"temp-dir", "FOLDER", 0, B | V | S, o_temp_dir, "where scratch files go (default: beside the output)"},
     {"inner-depth", "N", 0, B | V | S, o_depth, "levels of the octree inside each node, 1 to 9 (default: 7)"},
     {"columns", "NAMES", 0, B | V | S, o_columns, "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
+    {"poses", "FILE", 0, B | V | S | I, o_poses, "moves scans: lines of a file name and a 4 x 4 matrix (NAME.pose.txt beside a scan does it too)"},
+    {"crop", "BOX", 0, B | V | S | I, o_crop, "keep what is inside X0,Y0,Z0,X1,Y1,Z1; the rest is counted"},
+    {"crs", "TEXT", 0, B | V, o_crs, "coordinate reference system to note (default: what the scans say)"},
     {"budget", "POINTS", 0, V | S, o_budget, "most points drawn in a frame, as in 2M, or all (default: 3M in a window, all in a shot)"},
     {"min-node-size", "PX", 0, V | S, o_min_node_size, "nodes that are smaller on the screen are not drawn (default: by detail)"},
     {"point-size", "SIZE", 0, V | S, o_point_size, "pixels, as in 2; metres, as in 0.01m; or auto (default)"},

@@ -10,7 +10,9 @@ typedef struct {
     const char *const *paths; /* [path_count], borrowed from argv */
     size_t path_count;
     bool help, json, stats, force, quiet, each;
-    const char *output, *temp_dir, *columns, *screenshot;
+    const char *output, *temp_dir, *columns, *screenshot, *poses, *crs;
+    bool has_crop;
+    double crop[6];                /* low x, y, z, high x, y, z */
     uint32_t threads, inner_depth; /* 0: default */
     uint64_t memory;               /* bytes; 0: default */
     uint32_t width, height;        /* 0: default */

@@ -35,6 +35,7 @@ static void print_scan(FILE *out, const prep_inspection *scan, uint32_t count)
         if (at->components > 1) fprintf(out, "[%u]", at->components);
     }
     fprintf(out, "%s\n", info->attributes.count == 0 ? " none" : "");
+    if (info->crs[0] != '\0') fprintf(out, "  crs        %.200s%s\n", info->crs, strlen(info->crs) > 200 ? " ..." : "");
     if (info->step > 0) fprintf(out, "  step       %.9g\n", info->step);
     if (info->has_pose) {
         const double at[3] = {info->pose[3], info->pose[7], info->pose[11]};
@@ -79,6 +80,7 @@ static json_t *scan_json(const prep_inspection *scan)
     if (scan->points > 0 && (scan->was_read || info->has_bounds))
         json_object_set_new(json, "bounds", json_pack("{s:o, s:o}", "min", cli_triple_json(scan->low), "max", cli_triple_json(scan->high)));
     if (scan->was_read && scan->points > 0) json_object_set_new(json, "mean", cli_triple_json(scan->mean));
+    if (info->crs[0] != '\0') json_object_set_new(json, "crs", cli_text_json(info->crs));
     if (info->has_pose) {
         json_t *pose = json_array();
         for (int k = 0; k < 16; k++) json_array_append_new(pose, json_real(info->pose[k]));

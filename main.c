@@ -64,9 +64,18 @@ static prep_build_options build_options(const cli_options *o, const char *output
 {
     return (prep_build_options){
         .inputs = o->paths, .input_count = o->path_count, .output = output, .temp_dir = o->temp_dir, .force = o->force,
-        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .columns = o->columns,
+        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .crs = o->crs,
         .progress = on_build_progress, .context = progress,
     };
+}
+
+/* Columns, poses and crop. The list of poses is the caller's to release. */
+static bool read_scan_options(const cli_options *o, prep_pose_list *poses, prep_scan_options *out, mospt_err *err)
+{
+    *poses = (prep_pose_list){0};
+    *out = (prep_scan_options){.columns = o->columns, .poses = poses, .has_crop = o->has_crop};
+    for (int a = 0; a < 3; a++) out->crop_low[a] = o->crop[a], out->crop_high[a] = o->crop[a + 3];
+    return o->poses == NULL || prep_pose_list_read(o->poses, poses, err);
 }
 
 static int build_to(const cli_options *o, const char *output, bool words, mospt_err *err)
@@ -74,13 +83,16 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
     prep_build_result result;
     cli_progress progress;
     cli_progress_start(&progress, o->quiet);
+    prep_pose_list poses;
     prep_build_options options = build_options(o, output, &progress);
     options.announce = on_build_announce;
+    if (!read_scan_options(o, &poses, &options.scans, err)) return EXIT_FAILED;
     /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit is that of the process.
      * A renderer is better served by the allocator's own ways. */
     mallopt(M_MMAP_THRESHOLD, 64 << 10);
     bool ok = prep_build(&options, &result, err);
     mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    prep_pose_list_fini(&poses);
     cli_progress_end(&progress);
     if (ok || result.source.left_out_count > 1) cli_report_losses(&result);
     if (ok && o->json && words) cli_report_build_json(stdout, output, &result);
@@ -106,9 +118,12 @@ static int build_each(const cli_options *o)
     cli_progress progress;
     size_t failed = 0, lacking = 0;
     cli_progress_start(&progress, o->quiet);
+    prep_pose_list poses;
     prep_build_options options = build_options(o, o->output, &progress);
+    if (!read_scan_options(o, &poses, &options.scans, &err)) return fail(&err);
     mallopt(M_MMAP_THRESHOLD, 64 << 10);
     bool ok = cli_each(&options, on_each, &report, &err);
+    prep_pose_list_fini(&poses);
     cli_progress_end(&progress);
     if (ok && o->json) cli_report_each_json(stdout, o->output, &report);
     else if (ok) cli_report_each(stdout, &report);
@@ -142,10 +157,12 @@ static bool is_dataset_name(const char *path)
 static int info_of_scans(const cli_options *o)
 {
     mospt_err err = {0};
-    const prep_scan_options options = {.columns = o->columns};
+    prep_pose_list poses;
+    prep_scan_options options;
     prep_inspection *scans = malloc(sizeof *scans);
     uint32_t count = 1;
-    bool ok = scans != NULL && prep_inspect(o->paths[0], 0, &options, o->stats, &scans[0], &err);
+    bool ok = read_scan_options(o, &poses, &options, &err) && (scans != NULL || mospt_err_nomem(&err, sizeof *scans)) &&
+              prep_inspect(o->paths[0], 0, &options, o->stats, &scans[0], &err);
     if (ok && scans[0].info.scan_count > 1) {
         count = scans[0].info.scan_count;
         prep_inspection *all = realloc(scans, count * sizeof *scans);
@@ -158,6 +175,7 @@ static int info_of_scans(const cli_options *o)
     if (ok && o->json) cli_report_scans_json(stdout, o->paths[0], scans, count);
     else if (ok) cli_report_scans(stdout, o->paths[0], scans, count);
     free(scans);
+    prep_pose_list_fini(&poses);
     return !ok ? fail(&err) : damaged ? EXIT_LEFT_OUT : EXIT_DONE;
 }
 

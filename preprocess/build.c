@@ -16,6 +16,8 @@
 #include <unistd.h>
 
 enum { PACK_SLICE = 8192 };
+/* What a dataset is called that will take another one's place. */
+static const char BESIDE[] = ".building";
 
 typedef struct {
     const prep_build_options *options;
@@ -101,12 +103,12 @@ static bool choose_folders(build *b, mospt_err *err)
     if (mospt_dataset_exists(o->output) && !o->force)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output), "is a dataset already; --force replaces it");
     bool replaces = mospt_dataset_exists(o->output);
-    b->target = malloc(n + 5);
+    b->target = malloc(n + sizeof BESIDE);
     b->replaced = replaces ? strndup(o->output, n) : NULL;
     b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : folder_of(o->output);
     if (b->target == NULL || b->scratch_folder == NULL || (replaces && b->replaced == NULL)) return mospt_err_nomem(err, n);
     memcpy(b->target, o->output, n);
-    strcpy(b->target + n, replaces ? ".new" : "");
+    strcpy(b->target + n, replaces ? BESIDE : "");
     if (access(b->scratch_folder, W_OK | X_OK) != 0)
         return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
     return true;
@@ -350,6 +352,10 @@ static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *er
             return mospt_err_nomem(err, sizeof *m->sources);
         }
     }
+    const char *crs = b->options->crs;
+    for (uint32_t i = 0; crs == NULL && i < source->scan_count; i++)
+        if (source->scans[i].info.crs[0] != '\0') crs = source->scans[i].info.crs;
+    if (crs != NULL && (m->crs = strdup(crs)) == NULL) return mospt_err_nomem(err, strlen(crs));
     m->points_hash = all.hash;
     m->position_error = all.position_error;
     for (int a = 0; a < 3; a++) {
@@ -394,7 +400,6 @@ static bool run(build *b, mospt_err *err)
 {
     const prep_build_options *o = b->options;
     prep_source *source = &b->result->source;
-    prep_scan_options scan_options = {.columns = o->columns};
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     uint32_t threads = o->threads > 0 ? o->threads : processors > 0 ? (uint32_t)processors : 1;
     uint64_t memory = o->memory > 0 ? o->memory : prep_plan_machine_memory() / 4;
@@ -404,10 +409,12 @@ static bool run(build *b, mospt_err *err)
     b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
     b->metadata->add_threshold = PREP_ADD_THRESHOLD;
     if (!choose_folders(b, err)) return false;
+    /* Killed between its commit and its taking the place of the old one: nobody else has such a name. */
+    if (b->replaced != NULL && mospt_dataset_exists(b->target) && !mospt_file_remove_tree(b->target, err)) return false;
     /* A place that cannot be had is known before the scans are read. */
     if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
     if (!prep_folder_list_make(o->inputs, o->input_count, &b->result->files, err)) return false;
-    if (!prep_source_open(&b->result->files, &scan_options, b->scratch_folder, source, err)) return false;
+    if (!prep_source_open(&b->result->files, &o->scans, b->scratch_folder, source, err)) return false;
     if (!measure(b, false, err)) return false;
     if (!make_schema(b, err)) return false;
     if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth, &b->plan, err))

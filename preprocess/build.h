@@ -28,7 +28,8 @@ typedef struct {
     uint32_t threads;          /* 0: one per processor */
     uint64_t memory;           /* bytes, the peak of the process; 0: a quarter of the machine */
     uint32_t inner_depth;      /* 0: 7 */
-    const char *columns;       /* of text files; NULL: recognised */
+    prep_scan_options scans;   /* columns, poses, crop */
+    const char *crs;           /* coordinate reference system; NULL: what the scans say */
     /* Told often, by one thread at a time; returns false to stop. NULL: none. */
     bool (*progress)(void *context, const prep_progress *progress);
     /* Told once, before the points are read: points (0: unknown) and the scratch space that may be needed. */

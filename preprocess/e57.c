@@ -31,7 +31,6 @@ typedef struct {
     prep_e57_points points;
     uint64_t next; /* record */
     bool is_ended; /* before the last record */
-    char *crs;     /* owned, NULL if there is none */
 } e57_state;
 
 static bool refuse(const prep_scan *scan, uint64_t place, const char *why, mospt_err *err)
@@ -163,7 +162,8 @@ static bool search_scans(prep_scan *scan, e57_state *e57, search *s, mospt_err *
         xml.as_latin1 = true; /* some writers name scans in the code page of their machine */
         ok = prep_e57_xml_read(&e57->pages, &xml, &file, &why);
     }
-    e57->crs = file.crs;
+    if (file.crs != NULL) snprintf(scan->info.crs, sizeof scan->info.crs, "%s", file.crs);
+    free(file.crs);
     if (!ok && (why.code != MOSPT_EFORMAT || !file.has_all_scans)) {
         if (err != NULL) *err = why;
         return false;
@@ -483,14 +483,7 @@ static void e57_close(prep_scan *scan)
     if (e57 == NULL) return;
     release(e57);
     free(e57->desc);
-    free(e57->crs);
     free(e57);
-}
-
-const char *prep_e57_crs(const prep_scan *scan)
-{
-    const e57_state *e57 = scan->state;
-    return e57->crs != NULL ? e57->crs : "";
 }
 
 const prep_scan_format prep_e57_format = {e57_open, e57_read, e57_rewind, e57_close};

@@ -8,12 +8,8 @@
  * return_number (counted from 1, as in LAS; E57 counts from 0), number_of_returns, gps_time
  * (timeStamp: seconds since the scan began), color_invalid, intensity_invalid, time_invalid, and
  * the numbers of extensions under their own names. Pictures, blobs, strings and groupings are
- * passed over. */
+ * passed over. The coordinate reference system is the file's coordinateMetadata. */
 #pragma once
 #include "preprocess/scan_format.h"
 
 extern const prep_scan_format prep_e57_format;
-
-/* The file's coordinateMetadata, as WKT or whatever its writer put there; "" if it has none.
- * Borrowed from the scan, which is one of this format. */
-const char *prep_e57_crs(const prep_scan *scan);

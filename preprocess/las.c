@@ -137,6 +137,21 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     return ok;
 }
 
+/* A coder that starts from a damaged first record shifts all that follow, and nothing in the stream
+ * tells; the bounds in the header do. */
+static void check_first_point(prep_scan *scan, const las_state *las, const double *xyz)
+{
+    const prep_las_header *h = &las->header;
+    for (int a = 0; h->has_bounds && a < 3; a++) {
+        if (xyz[a] >= h->low[a] - h->scale[a] && xyz[a] <= h->high[a] + h->scale[a]) continue;
+        prep_scan_set_damage(scan, mospt_at_byte(scan->path, h->data_offset),
+                             "the first point, at %.10g along %c, is outside the header's bounds: "
+                             "one of them is damaged, and all points after it may be shifted",
+                             xyz[a], "xyz"[a]);
+        return;
+    }
+}
+
 static bool read_chunks(prep_scan *scan, las_state *las, prep_batch *batch, mospt_err *err)
 {
     while (batch->count < batch->capacity) {
@@ -146,6 +161,8 @@ static bool read_chunks(prep_scan *scan, las_state *las, prep_batch *batch, mosp
             return false;
         if (count == 0) break;
         prep_las_decode(&las->layout, records, (uint32_t)count, batch);
+        if (las->next == 0) check_first_point(scan, las, batch->xyz);
+        las->next += count;
     }
     note_laz_damage(scan, las->laz);
     return true;

@@ -50,6 +50,7 @@ typedef struct {
     bool has_bounds; /* finite and ordered */
     prep_las_extra extra[PREP_LAS_EXTRA_MAX];
     uint32_t extra_count;
+    char crs[PREP_CRS_SIZE]; /* WKT where there is one, else "EPSG:..." of the GeoTIFF keys; "" */
 } prep_las_header;
 
 /* Reads the header and the records that describe extra bytes, every length checked against the

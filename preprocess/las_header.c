@@ -4,6 +4,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,6 +16,9 @@ enum {
     EXTRA_SIZE = 192,
     EXTRA_RECORD = 4,
     LASZIP_RECORD = 22204,
+    WKT_RECORD = 2112,
+    GEOKEYS_RECORD = 34735,
+    GEOKEYS_SIZE_MAX = 4096,
 };
 
 static const uint8_t record_size[PREP_LAS_FORMATS] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
@@ -149,6 +153,43 @@ static bool read_extra(prep_input *in, uint64_t offset, uint64_t size, prep_las_
     return true;
 }
 
+/* Coordinate reference system as text (LAS 1.4, OGC WKT). */
+static bool read_wkt(prep_input *in, uint64_t offset, uint64_t size, prep_las_header *h,
+                     mospt_err *err)
+{
+    size_t got;
+    if (size >= sizeof h->crs) size = sizeof h->crs - 1;
+    if (!prep_input_read_at(in, offset, h->crs, size, &got, err)) return false;
+    h->crs[got] = '\0';
+    h->crs[strcspn(h->crs, "\r\n")] = '\0';
+    return true;
+}
+
+/* GeoTIFF keys: an array of four 16-bit numbers each, after a head of the same shape. Of them, the
+ * code of the projected, else of the geographic system, and that of the heights. */
+static bool read_geokeys(prep_input *in, uint64_t offset, uint64_t size, prep_las_header *h,
+                         mospt_err *err)
+{
+    enum { GEOGRAPHIC = 2048, PROJECTED = 3072, VERTICAL = 4096, PRIVATE_FROM = 32767 };
+    uint8_t keys[GEOKEYS_SIZE_MAX];
+    size_t got;
+    uint16_t code[3] = {0};
+    if (size > sizeof keys) size = sizeof keys;
+    if (!prep_input_read_at(in, offset, keys, size, &got, err)) return false;
+    for (size_t at = 8; at + 8 <= got; at += 8) {
+        uint16_t id = prep_le16(keys + at), place = prep_le16(keys + at + 2);
+        uint16_t value = prep_le16(keys + at + 6);
+        if (place != 0 || value == 0 || value >= PRIVATE_FROM) continue;
+        if (id == GEOGRAPHIC) code[0] = value;
+        if (id == PROJECTED) code[1] = value;
+        if (id == VERTICAL) code[2] = value;
+    }
+    uint16_t plane = code[1] != 0 ? code[1] : code[0];
+    if (plane != 0 && code[2] != 0) snprintf(h->crs, sizeof h->crs, "EPSG:%u+%u", plane, code[2]);
+    else if (plane != 0) snprintf(h->crs, sizeof h->crs, "EPSG:%u", plane);
+    return true;
+}
+
 static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, uint64_t size,
                         prep_las_header *h, mospt_err *err)
 {
@@ -158,6 +199,9 @@ static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, u
     if (strcmp(user, "laszip encoded") == 0 && record == LASZIP_RECORD) h->is_compressed = true;
     if (strcmp(user, "LASF_Spec") == 0 && record == EXTRA_RECORD && h->extra_count == 0)
         return read_extra(in, payload, size, h, err);
+    if (strcmp(user, "LASF_Projection") != 0) return true;
+    if (record == WKT_RECORD) return read_wkt(in, payload, size, h, err);
+    if (record == GEOKEYS_RECORD && h->crs[0] == '\0') return read_geokeys(in, payload, size, h, err);
     return true;
 }
 

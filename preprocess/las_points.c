@@ -166,6 +166,7 @@ void prep_las_describe(prep_scan *scan, const prep_las_header *h)
              h->is_compressed ? "LAZ" : "LAS", h->version_minor, h->point_format);
     info->point_count = h->present;
     info->has_bounds = h->has_bounds;
+    snprintf(info->crs, sizeof info->crs, "%s", h->crs);
     info->step = h->scale[0];
     for (int a = 0; a < 3; a++) {
         if (h->scale[a] < info->step) info->step = h->scale[a];

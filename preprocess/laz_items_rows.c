@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { WINDOW_SIZE = 64 * 1024, POINT_SIZE = 20 };
+enum { WINDOW_SIZE = 64 * 1024 };
 
 /* One context per combination of return number (columns) and number of returns (rows); the sensible
  * ones of up to five returns have one of their own, the others share. */

@@ -269,6 +269,7 @@ static bool ply_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     if (!take_sample(scan, ply, err)) return false;
     make_planes(scan, ply);
     release(ply);
+    ply->rows.may_split = true;
     return true;
 }
 

@@ -7,6 +7,7 @@
  * as `normal` f32 x 3, everything else under its own name and type. Lists are passed over, wherever
  * they are. */
 #pragma once
+#include "preprocess/ahead.h"
 #include "preprocess/lines.h"
 #include "preprocess/scan_format.h"
 
@@ -49,19 +50,37 @@ bool prep_ply_header_read(prep_input *input, prep_ply_header *out, mospt_err *er
  */
 int prep_ply_find(const prep_ply_header *header, const prep_ply_element *element, const char *name);
 
+/* Lines of ascii data, and the vertices that they hold. */
+typedef struct {
+    prep_line_block lines;
+    uint8_t *rows; /* [size], owned */
+    size_t size;
+    uint64_t seen;     /* lines that are not blank: as many vertices, readable or not */
+    uint64_t bad_line; /* number of the first line that is no vertex; 0: there is none */
+    uint32_t count;    /* vertices that could be read, a row each */
+    uint32_t handed_out;
+} prep_ply_block;
+
 /* The element's scalar properties, one packed row per vertex, in the byte order of this machine. */
 typedef struct {
     const prep_ply_header *header;  /* borrowed */
     const prep_ply_element *vertex; /* borrowed */
     uint64_t offset;                /* of the first vertex in the unpacked data */
     uint64_t line;                  /* lines before it, ascii only */
-    uint64_t next, present;
-    uint8_t *rows; /* [capacity * row_size], owned */
+    uint64_t next, present;         /* vertices behind, with those of the block; in the file */
+    uint8_t *rows;                  /* [capacity * row_size], owned */
     uint32_t capacity;
     uint8_t *buffer; /* owned, raw bytes of binary data with lists */
     size_t begin, end;
-    prep_lines lines; /* owned, ascii */
     bool is_at_end;
+    /* ascii: */
+    prep_lines lines; /* owned; of the elements before the vertices */
+    bool may_split;   /* other threads may help: set by whoever is going to read all vertices */
+    prep_line_cutter cutter;
+    prep_ahead *ahead;     /* owned */
+    prep_ply_block *block; /* borrowed; NULL: none is at hand */
+    uint64_t last_line;    /* number of the last line that was read */
+    const char *fault;     /* why the lines end early */
 } prep_ply_rows;
 
 /* Finds the first vertex behind the elements that come before it. */

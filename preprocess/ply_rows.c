@@ -10,6 +10,16 @@
 
 enum { ROWS_SIZE = 256 * 1024, BUFFER_SIZE = 128 * 1024, LINE_SIZE = 128 * 1024 };
 
+static void stop_blocks(prep_ply_rows *rows)
+{
+    prep_ahead_destroy(rows->ahead);
+    prep_line_cutter_fini(&rows->cutter);
+    rows->ahead = NULL;
+    rows->block = NULL;
+    rows->last_line = rows->line;
+    rows->fault = NULL;
+}
+
 static bool is_ascii(const prep_ply_rows *rows)
 {
     return rows->header->encoding == PREP_PLY_ASCII;
@@ -37,6 +47,7 @@ static bool alloc_buffers(prep_ply_rows *rows, mospt_err *err)
 
 void prep_ply_rows_release(prep_ply_rows *rows)
 {
+    stop_blocks(rows);
     free(rows->rows);
     free(rows->buffer);
     prep_lines_fini(&rows->lines);
@@ -152,14 +163,12 @@ static step skip_element(prep_scan *scan, prep_ply_rows *rows, const prep_ply_el
     return STEP_OK;
 }
 
-static bool start_at(prep_scan *scan, prep_ply_rows *rows, uint64_t offset, uint64_t line,
-                     mospt_err *err)
+static bool start_at(prep_scan *scan, prep_ply_rows *rows, uint64_t offset, mospt_err *err)
 {
-    if (!prep_input_seek(scan->input, offset, err)) return false;
+    stop_blocks(rows);
     rows->begin = rows->end = 0;
     rows->is_at_end = false;
-    prep_lines_fini(&rows->lines);
-    return !is_ascii(rows) || prep_lines_init(&rows->lines, scan->input, LINE_SIZE, line, err);
+    return prep_input_seek(scan->input, offset, err);
 }
 
 /* As many points as the file may hold: a count from the header is not believed beyond that. */
@@ -178,7 +187,10 @@ bool prep_ply_rows_locate(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
 {
     const prep_ply_header *h = rows->header;
     if (!alloc_buffers(rows, err)) return false;
-    if (!start_at(scan, rows, h->size, h->line_count, err)) return false;
+    if (!start_at(scan, rows, h->size, err)) return false;
+    if (is_ascii(rows) &&
+        !prep_lines_init(&rows->lines, scan->input, LINE_SIZE, h->line_count, err))
+        return false;
     for (const prep_ply_element *e = h->element; e != rows->vertex; e++) {
         step status = skip_element(scan, rows, e, err);
         if (status == STEP_ERROR) return false;
@@ -191,6 +203,7 @@ bool prep_ply_rows_locate(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
     if (is_ascii(rows)) {
         rows->offset = prep_input_tell(scan->input) - (rows->lines.end - rows->lines.begin);
         rows->line = rows->lines.number;
+        prep_lines_fini(&rows->lines);
     }
     rows->present = count_present(scan, rows);
     return true;
@@ -199,7 +212,7 @@ bool prep_ply_rows_locate(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
 bool prep_ply_rows_seek(prep_scan *scan, prep_ply_rows *rows, uint64_t vertex, mospt_err *err)
 {
     rows->next = vertex;
-    return start_at(scan, rows, rows->offset + vertex * rows->vertex->row_size, rows->line, err);
+    return start_at(scan, rows, rows->offset + vertex * rows->vertex->row_size, err);
 }
 
 /* The values of one line; false if it has too few, or something that is no number. */
@@ -228,28 +241,110 @@ static bool parse_row(const prep_ply_rows *rows, const char *p, const char *end,
     return true;
 }
 
+/* At least a digit and a blank, or the end of the line, for each property. */
+static bool make_room(const prep_ply_element *e, prep_ply_block *block, mospt_err *err)
+{
+    size_t size = (block->lines.size / (2 * e->property_count) + 1) * e->row_size;
+    if (block->size >= size) return true;
+    free(block->rows);
+    block->rows = malloc(size);
+    block->size = block->rows != NULL ? size : 0;
+    return block->rows != NULL || mospt_err_nomem(err, size);
+}
+
+/* Takes the first `limit` vertices from a block. */
+static void parse_block(const prep_ply_rows *rows, prep_ply_block *block, uint64_t limit)
+{
+    prep_line_cursor cursor = {0};
+    const char *text;
+    size_t length, row_size = rows->vertex->row_size;
+    block->seen = block->bad_line = 0;
+    block->count = block->handed_out = 0;
+    while (block->seen < limit && prep_line_block_next(&block->lines, &cursor, &text, &length)) {
+        const char *end = text + length;
+        while (text < end && (*text == ' ' || *text == '\t'))
+            text++;
+        if (text == end) continue;
+        block->seen++;
+        if (parse_row(rows, text, end, block->rows + block->count * row_size)) block->count++;
+        else if (block->bad_line == 0) block->bad_line = cursor.number;
+    }
+}
+
+static bool work_on_block(const void *context, void *block, mospt_err *err)
+{
+    const prep_ply_rows *rows = context;
+    if (!make_room(rows->vertex, block, err)) return false;
+    parse_block(rows, block, UINT64_MAX);
+    return true;
+}
+
+static bool fill_block(void *context, void *block, bool *is_last, mospt_err *err)
+{
+    prep_ply_rows *rows = context;
+    prep_line_block *lines = &((prep_ply_block *)block)->lines;
+    if (!prep_line_cutter_next(&rows->cutter, lines, err)) return false;
+    *is_last = lines->is_last;
+    return true;
+}
+
+static void fini_block(void *block)
+{
+    prep_line_block_fini(&((prep_ply_block *)block)->lines);
+    free(((prep_ply_block *)block)->rows);
+}
+
+static bool start_blocks(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
+{
+    prep_ahead_task task = {rows, sizeof(prep_ply_block), fill_block, work_on_block, fini_block};
+    uint32_t threads = rows->may_split ? prep_line_threads(scan->input) : 0;
+    if (!prep_input_seek(scan->input, rows->offset, err)) return false;
+    prep_line_cutter_init(&rows->cutter, scan->input, rows->line);
+    return prep_ahead_create(&task, threads, &rows->ahead, err);
+}
+
+/* Goes on to the next block of lines, and counts what is in it. */
+static bool next_block(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
+{
+    void *memory;
+    if (rows->ahead == NULL && !start_blocks(scan, rows, err)) return false;
+    rows->block = NULL;
+    if (!prep_ahead_next(rows->ahead, &memory, err)) return false;
+    prep_ply_block *block = memory;
+    rows->is_at_end = block == NULL;
+    if (block == NULL) return true;
+
+    /* lines behind the vertices belong to other elements */
+    uint64_t left = rows->vertex->count - rows->next;
+    if (block->seen > left) parse_block(rows, block, left);
+    rows->block = block;
+    rows->next += block->seen;
+    rows->last_line = block->lines.last_line;
+    rows->fault = block->lines.fault;
+    scan->dropped[PREP_DROP_UNREADABLE] += block->seen - block->count;
+    if (block->bad_line > 0)
+        prep_scan_set_damage(scan, mospt_at_line(scan->path, block->bad_line),
+                             "not the %u numbers of a vertex", rows->vertex->property_count);
+    return true;
+}
+
 static bool read_ascii(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uint32_t *count,
                        mospt_err *err)
 {
-    uint32_t done = 0;
     size_t size = rows->vertex->row_size;
-    while (done < want && rows->next < rows->vertex->count) {
-        const char *text, *end;
-        if (!next_line(rows, &text, &end, err)) return false;
-        if (text == NULL) {
-            rows->is_at_end = true;
-            break;
-        }
-        rows->next++;
-        if (parse_row(rows, text, end, rows->rows + done * size)) {
-            done++;
+    while (*count < want) {
+        prep_ply_block *block = rows->block;
+        uint32_t ready = block != NULL ? block->count - block->handed_out : 0;
+        if (ready == 0) {
+            if (rows->is_at_end || rows->next == rows->vertex->count) break;
+            if (!next_block(scan, rows, err)) return false;
             continue;
         }
-        scan->dropped[PREP_DROP_UNREADABLE]++;
-        prep_scan_set_damage(scan, mospt_at_line(scan->path, rows->lines.number),
-                             "not the %u numbers of a vertex", rows->vertex->property_count);
+        if (ready > want - *count) ready = want - *count;
+        memcpy(rows->rows + *count * size, block->rows + block->handed_out * size, ready * size);
+        block->handed_out += ready;
+        *count += ready;
     }
-    *count = done;
     return true;
 }
 
@@ -294,9 +389,9 @@ static void swap_rows(prep_ply_rows *rows, uint32_t count)
 
 static void tell_early_end(prep_scan *scan, const prep_ply_rows *rows)
 {
-    mospt_where at = is_ascii(rows) ? mospt_at_line(scan->path, rows->lines.number)
+    mospt_where at = is_ascii(rows) ? mospt_at_line(scan->path, rows->last_line)
                                     : mospt_at_byte(scan->path, tell(scan, rows));
-    const char *fault = prep_input_fault(scan->input);
+    const char *fault = is_ascii(rows) ? rows->fault : prep_input_fault(scan->input);
     prep_scan_set_damage(
         scan, at, "%s: the header claims %" PRIu64 " vertices, %" PRIu64 " are there",
         fault != NULL ? fault : "the data ends here", rows->vertex->count, rows->next);
@@ -307,16 +402,18 @@ bool prep_ply_rows_read(prep_scan *scan, prep_ply_rows *rows, uint32_t want, uin
 {
     *count = 0;
     if (!alloc_buffers(rows, err)) return false;
-    if (is_ascii(rows) && rows->lines.buffer == NULL &&
-        !start_at(scan, rows, rows->offset, rows->line, err))
-        return false;
-    uint64_t left = rows->vertex->count - rows->next;
-    if (rows->is_at_end || left == 0) return true;
+    if (rows->is_at_end) return true;
     if (want > rows->capacity) want = rows->capacity;
-    if (want > left) want = (uint32_t)left;
-    bool ok = is_ascii(rows)            ? read_ascii(scan, rows, want, count, err)
-              : rows->vertex->has_lists ? read_lists(scan, rows, want, count, err)
-                                        : read_packed(scan, rows, want, count, err);
+    bool ok;
+    if (is_ascii(rows)) {
+        ok = read_ascii(scan, rows, want, count, err);
+    } else {
+        uint64_t left = rows->vertex->count - rows->next;
+        if (left == 0) return true;
+        if (want > left) want = (uint32_t)left;
+        ok = rows->vertex->has_lists ? read_lists(scan, rows, want, count, err)
+                                     : read_packed(scan, rows, want, count, err);
+    }
     if (!ok) return false;
     if (is_swapped(rows)) swap_rows(rows, *count);
     if (rows->is_at_end) tell_early_end(scan, rows);

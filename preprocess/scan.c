@@ -23,7 +23,7 @@ static const double COORDINATE_MAX = 1e15;
 const char *prep_drop_name(prep_drop reason)
 {
     static const char *const names[PREP_DROP_REASONS] = {"not finite", "out of range", "no return",
-                                                         "unreadable"};
+                                                         "unreadable", "outside the crop"};
     return reason < PREP_DROP_REASONS ? names[reason] : "unknown";
 }
 
@@ -185,6 +185,8 @@ static bool choose_format(prep_scan *scan, mospt_err *err)
                          "binary data, but no scan format that this program knows");
 }
 
+static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_err *err);
+
 bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *options,
                     prep_scan **out, mospt_err *err)
 {
@@ -204,6 +206,7 @@ bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *o
                       index, scan->info.scan_count);
         goto fail;
     }
+    if (!place_scan(scan, options != NULL ? options : &defaults, err)) goto fail;
     scan->was_damaged_at_open = scan->is_damaged;
     *out = scan;
     return true;
@@ -234,11 +237,66 @@ static bool is_in_range(const double *xyz)
            fabs(xyz[2]) <= COORDINATE_MAX;
 }
 
+/* Moves what the scan declares to where its pose puts it. */
+static void move_info(prep_scan *scan)
+{
+    prep_scan_info *info = &scan->info;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, pose[16];
+    for (int corner = 0; corner < 8; corner++) {
+        double in[3], out[3];
+        for (int a = 0; a < 3; a++) in[a] = corner >> a & 1 ? info->high[a] : info->low[a];
+        prep_pose_apply(scan->move, in, out);
+        for (int a = 0; a < 3; a++) low[a] = fmin(low[a], out[a]), high[a] = fmax(high[a], out[a]);
+    }
+    if (info->has_bounds) memcpy(info->low, low, sizeof low), memcpy(info->high, high, sizeof high);
+    if (info->has_pose) prep_pose_multiply(scan->move, info->pose, pose);
+    else memcpy(pose, scan->move, sizeof pose);
+    memcpy(info->pose, pose, sizeof pose);
+    info->has_pose = true;
+    info->step = 0; /* the file's lattice is turned */
+    for (int a = 0; a < 3; a++) info->offset[a] = 0;
+}
+
+/* What the crop leaves of the declared bounds. Where that is nothing, reading will tell. */
+static void crop_info(prep_scan *scan)
+{
+    prep_scan_info *info = &scan->info;
+    for (int a = 0; a < 3; a++) {
+        info->low[a] = fmax(info->low[a], scan->crop_low[a]);
+        info->high[a] = fmin(info->high[a], scan->crop_high[a]);
+        if (info->low[a] > info->high[a]) info->has_bounds = false;
+    }
+}
+
+static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_err *err)
+{
+    if (!prep_pose_find(options->poses, scan->path, scan->info.name, &scan->is_moved, scan->move, err)) return false;
+    if (scan->is_moved) move_info(scan);
+    scan->has_crop = options->has_crop;
+    memcpy(scan->crop_low, options->crop_low, sizeof scan->crop_low);
+    memcpy(scan->crop_high, options->crop_high, sizeof scan->crop_high);
+    if (scan->has_crop) crop_info(scan);
+    return true;
+}
+
+static bool is_kept(const prep_scan *scan, const double *xyz)
+{
+    if (!is_in_range(xyz)) return false;
+    for (int a = 0; scan->has_crop && a < 3; a++)
+        if (xyz[a] < scan->crop_low[a] || xyz[a] > scan->crop_high[a]) return false;
+    return true;
+}
+
+static prep_drop reason_for(const double *p)
+{
+    if (is_in_range(p)) return PREP_DROP_CROPPED;
+    return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) ? PREP_DROP_OUT_OF_RANGE : PREP_DROP_NOT_FINITE;
+}
+
 static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     uint32_t first = 0;
-    while (first < batch->count && is_in_range(batch->xyz + 3 * (size_t)first))
-        first++;
+    while (first < batch->count && is_kept(scan, batch->xyz + 3 * (size_t)first)) first++;
     if (first == batch->count) return true;
 
     if (scan->keep_capacity < batch->count) {
@@ -249,13 +307,20 @@ static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
     }
     for (uint32_t i = 0; i < batch->count; i++) {
         const double *p = batch->xyz + 3 * (size_t)i;
-        scan->keep[i] = is_in_range(p);
-        if (scan->keep[i]) continue;
-        bool is_finite = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
-        scan->dropped[is_finite ? PREP_DROP_OUT_OF_RANGE : PREP_DROP_NOT_FINITE]++;
+        scan->keep[i] = is_kept(scan, p);
+        if (!scan->keep[i]) scan->dropped[reason_for(p)]++;
     }
     prep_batch_compact(batch, scan->keep);
     return true;
+}
+
+static void move_points(const prep_scan *scan, prep_batch *batch)
+{
+    for (uint32_t i = 0; i < batch->count; i++) {
+        double *p = batch->xyz + 3 * (size_t)i, moved[3];
+        prep_pose_apply(scan->move, p, moved);
+        memcpy(p, moved, sizeof moved);
+    }
 }
 
 bool prep_scan_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
@@ -264,6 +329,7 @@ bool prep_scan_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
         batch->count = 0;
         if (!scan->format->read(scan, batch, err)) return false;
         if (batch->count == 0) return true;
+        if (scan->is_moved) move_points(scan, batch);
         if (!drop_unusable(scan, batch, err)) return false;
     } while (batch->count == 0);
     return true;

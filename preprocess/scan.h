@@ -5,6 +5,7 @@
  * Points come in file order, always the same, whatever the batch size. */
 #pragma once
 #include "preprocess/batch.h"
+#include "preprocess/pose.h"
 
 /* Why a point of a scan is not in the dataset. */
 typedef enum {
@@ -12,11 +13,14 @@ typedef enum {
     PREP_DROP_OUT_OF_RANGE, /* outside what any grid can hold */
     PREP_DROP_NO_RETURN,    /* the scanner marked the direction as without return, or the point as invalid */
     PREP_DROP_UNREADABLE,   /* a line or a record that is no point */
+    PREP_DROP_CROPPED,      /* outside the box that was asked for */
     PREP_DROP_REASONS,
 } prep_drop;
 
-/* "not finite", "out of range", "no return", "unreadable" */
+/* "not finite", "out of range", "no return", "unreadable", "outside the crop" */
 const char *prep_drop_name(prep_drop reason);
+
+enum { PREP_CRS_SIZE = 4096 };
 
 typedef struct {
     char name[256];          /* of the scan inside its file, or the file's base name */
@@ -30,7 +34,8 @@ typedef struct {
     double offset[3];        /* LAS: offset of its integer coordinates; else 0 */
     bool has_rgb, has_intensity;
     bool has_pose;
-    double pose[16];         /* scanner to world, row-major, already applied to the points; only with has_pose */
+    double pose[16];         /* scanner to world, row-major, applied to the points (PCD: not, see pcd.h); only with has_pose */
+    char crs[PREP_CRS_SIZE]; /* coordinate reference system: WKT, "EPSG:25832", or what the file says; "" if nothing */
     mospt_schema attributes; /* planes of its batches, in this order */
 } prep_scan_info;
 
@@ -38,6 +43,9 @@ typedef struct prep_scan prep_scan; /* opaque; one thread at a time */
 
 typedef struct {
     const char *columns; /* meaning of text columns, as --columns gives it ("x,y,z,intensity,r,g,b,-"); NULL: recognise */
+    const prep_pose_list *poses; /* borrowed; NULL: only sidecars move scans */
+    bool has_crop;
+    double crop_low[3], crop_high[3]; /* metres, world: what lies outside is dropped and counted */
 } prep_scan_options;
 
 /* Opens scan `index` of a file, whose format is recognised by content first and by name last.

@@ -26,6 +26,10 @@ struct prep_scan {
     prep_input *input; /* owned */
     void *state;       /* the reader's own */
     prep_scan_info info;
+    bool is_moved; /* by `move`, after the format has delivered a point */
+    double move[16];
+    bool has_crop;
+    double crop_low[3], crop_high[3];
     uint64_t dropped[PREP_DROP_REASONS];
     uint8_t *keep; /* owned, [keep_capacity] */
     uint32_t keep_capacity;

@@ -1,9 +1,7 @@
 #include "preprocess/text.h"
 
-#include "preprocess/lines.h"
-#include "preprocess/tone.h"
-
 #include <ctype.h>
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,25 +17,12 @@ enum {
     SAMPLE_MAX = SAMPLE_HEAD + SAMPLE_PLACES * SAMPLE_LINES,
 };
 
-/* Where the values of a column go in a batch. */
-typedef struct {
-    uint32_t column, plane, component;
-    mospt_type type;
-} text_target;
-
 typedef struct {
     prep_text_columns columns;
-    uint32_t needed;      /* columns that a line must have */
-    uint64_t needed_mask; /* those of them that must be no word */
-    uint64_t header_line; /* number of the line with the names; 0: there is none */
-    bool has_counts;      /* lines with a single integer announce how many points follow (PTS) */
-    int xyz[3], rgb[3], intensity; /* columns, -1: there is none */
-    double rgb_scale;              /* raw to 0..255; 0: no colour */
-    prep_tone tone;
-    text_target target[PREP_TEXT_COLUMNS_MAX];
-    uint32_t target_count;
-    prep_lines lines; /* owned */
-    uint64_t declared, taken, count_line;
+    prep_text_blocks blocks;
+    prep_text_block *block; /* borrowed: the one whose points are being handed out */
+    uint64_t declared, taken, count_line, last_line;
+    const char *fault;
     bool is_at_end;
 } text_state;
 
@@ -61,20 +46,6 @@ typedef struct {
     prep_text_range range[PREP_TEXT_COLUMNS_MAX];
     uint32_t mode; /* the usual number of columns */
 } text_sample;
-
-static bool is_comment(const char *p, const char *end)
-{
-    while (p < end && (*p == ' ' || *p == '\t'))
-        p++;
-    return p < end && (*p == '#' || *p == '%' || (*p == '/' && p + 1 < end && p[1] == '/'));
-}
-
-static void strip_mark(const prep_lines *lines, const char **text, size_t *length)
-{
-    if (lines->number != 1 || *length < 3 || memcmp(*text, "\xef\xbb\xbf", 3) != 0) return;
-    *text += 3;
-    *length -= 3;
-}
 
 /* "1,5;2,5;3,5" or "1,5 2,5 3,5": what separates is not the comma. */
 static bool has_decimal_commas(const char *p, const char *end)
@@ -127,7 +98,7 @@ static void quote(const char *text, size_t length, char out[QUOTE_SIZE + 1])
 static void take_line(text_sample *sample, const char *text, size_t length, uint64_t number)
 {
     const char *end = text + length;
-    if (is_comment(text, end)) {
+    if (prep_text_is_comment(text, end)) {
         if (sample->count == 0)
             sample->comment_count = prep_text_split_names(text, end, sample->comment);
         return;
@@ -164,7 +135,7 @@ static bool take_lines(prep_lines *lines, text_sample *sample, uint32_t limit, b
         if (text == NULL) break;
         /* the piece of a line that the buffer cut off says nothing */
         if (lines->in_long_line && lines->begin == lines->end && !lines->is_last) continue;
-        strip_mark(lines, &text, &length);
+        if (lines->number == 1) prep_text_strip_mark(&text, &length);
         take_line(sample, text, length, lines->number);
     }
     return true;
@@ -206,9 +177,13 @@ static void find_range(const text_sample *sample, uint32_t c, prep_text_range *o
     *out = (prep_text_range){.min = (double)NAN, .max = (double)NAN, .is_integer = true};
     for (uint32_t i = 0; i < sample->count; i++) {
         if (sample->columns[i] != sample->mode) continue;
-        if (sample->words[i] >> c & 1) words++;
+        bool is_word = sample->words[i] >> c & 1;
+        words += is_word;
         double v = sample->values[i][c];
-        if (!isfinite(v)) continue;
+        if (!isfinite(v)) {
+            out->has_gaps = out->has_gaps || !is_word;
+            continue;
+        }
         numbers++;
         if (!(v >= out->min)) out->min = v;
         if (!(v <= out->max)) out->max = v;
@@ -249,11 +224,12 @@ static bool check_sample(const prep_scan *scan, const text_sample *sample, bool 
 static bool check_share(const prep_scan *scan, const text_sample *sample, const text_state *text,
                         mospt_err *err)
 {
+    const prep_text_plan *plan = &text->blocks.plan;
     uint32_t good = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
-        bool ok = sample->columns[i] >= text->needed &&
+        bool ok = sample->columns[i] >= plan->needed &&
                   sample->columns[i] <= PREP_TEXT_COLUMNS_MAX &&
-                  (sample->words[i] & text->needed_mask) == 0;
+                  (sample->words[i] & plan->needed_mask) == 0;
         good += ok;
     }
     uint32_t bad = sample->count - good;
@@ -292,6 +268,7 @@ static bool columns_from_names(const prep_scan *scan, const text_sample *sample,
 static bool understand_columns(prep_scan *scan, text_sample *sample, const char *option,
                                text_state *text, mospt_err *err)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     prep_text_columns *columns = &text->columns;
     bool has_names = sample->name_count > 0, is_title = false;
     sample->mode = usual_columns(sample);
@@ -302,7 +279,7 @@ static bool understand_columns(prep_scan *scan, text_sample *sample, const char 
         has_names = !is_title;
     }
     if (!check_sample(scan, sample, has_names, err)) return false;
-    text->header_line = is_title ? 0 : sample->header_line;
+    plan->header_line = is_title ? 0 : sample->header_line;
     if (option != NULL) return columns_from_option(scan, option, sample, columns, err);
     if (has_names) return true;
     if (sample->mode < 3) return refuse(scan, sample, err);
@@ -314,69 +291,108 @@ static bool understand_columns(prep_scan *scan, text_sample *sample, const char 
     return true;
 }
 
-/* The type in which every value of the sample keeps its own. */
+static const struct {
+    mospt_type type;
+    double low, high;
+} integers[] = {{MOSPT_U8, 0, 255},
+                {MOSPT_U16, 0, 65535},
+                {MOSPT_I16, -32768, 32767},
+                {MOSPT_I32, -2147483648.0, 2147483647.0}};
+enum { INTEGER_COUNT = sizeof integers / sizeof integers[0] };
+
+/* The type in which every value of the sample keeps its own, also those that are missing. */
 static mospt_type fit_type(const prep_text_range *r, mospt_type wanted, bool is_intensity)
 {
-    static const struct {
-        mospt_type type;
-        double low, high;
-    } types[] = {{MOSPT_U8, 0, 255},
-                 {MOSPT_U16, 0, 65535},
-                 {MOSPT_I16, -32768, 32767},
-                 {MOSPT_I32, -2147483648.0, 2147483647.0}};
     if (wanted == MOSPT_F32 || wanted == MOSPT_F64) return wanted;
-    for (size_t i = 0; i < sizeof types / sizeof types[0] && r->is_integer; i++) {
-        bool is_wanted = is_intensity ? types[i].type != MOSPT_U8 : types[i].type == wanted;
-        if (is_wanted && r->min >= types[i].low && r->max <= types[i].high) return types[i].type;
+    for (size_t i = 0; i < INTEGER_COUNT && r->is_integer && !r->has_gaps; i++) {
+        mospt_type type = integers[i].type;
+        bool is_wanted = is_intensity ? type != MOSPT_U8 : type == wanted;
+        if (is_wanted && r->min >= integers[i].low && r->max <= integers[i].high) return type;
     }
-    return is_intensity ? MOSPT_F32 : MOSPT_F64;
+    bool is_wide = r->max > 1 << FLT_MANT_DIG || r->min < -(1 << FLT_MANT_DIG);
+    return is_intensity && !is_wide ? MOSPT_F32 : MOSPT_F64;
+}
+
+static void set_limits(prep_text_target *target)
+{
+    target->low = -DBL_MAX;
+    target->high = target->type == MOSPT_F32 ? (double)FLT_MAX : DBL_MAX;
+    for (size_t i = 0; i < INTEGER_COUNT; i++) {
+        if (integers[i].type != target->type) continue;
+        target->is_integer = true;
+        target->low = integers[i].low;
+        target->high = integers[i].high;
+    }
 }
 
 static void add_target(prep_scan *scan, text_state *text, const char *name, mospt_type type,
                        const int *columns, uint32_t components)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     int plane = prep_scan_add_attribute(scan, name, type, components);
-    for (uint32_t c = 0; c < components && plane >= 0; c++)
-        text->target[text->target_count++] =
-            (text_target){(uint32_t)columns[c], (uint32_t)plane, c, type};
+    for (uint32_t c = 0; c < components && plane >= 0; c++) {
+        prep_text_target *target = &plan->target[plan->target_count++];
+        *target = (prep_text_target){.column = (uint32_t)columns[c],
+                                     .plane = (uint32_t)plane,
+                                     .component = c,
+                                     .type = type,
+                                     .name = scan->info.attributes.at[plane].name};
+        set_limits(target);
+    }
+}
+
+/* A colour of bytes, or none at all, has no plane of its own. */
+static void add_shown_colour(prep_scan *scan, text_state *text)
+{
+    prep_text_plan *plan = &text->blocks.plan;
+    for (int k = 0; k < 3; k++)
+        plan->target[plan->target_count++] =
+            (prep_text_target){.column = (uint32_t)plan->rgb[k],
+                               .is_shown = true,
+                               .type = MOSPT_U8,
+                               .high = scan->info.has_rgb ? 255 : 0,
+                               .is_integer = true,
+                               .name = "colour"};
 }
 
 static void add_colour(prep_scan *scan, text_state *text, const text_sample *sample)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     double low = 0, max = 0;
     bool is_integer = true;
     for (int k = 0; k < 3; k++) {
-        const prep_text_range *r = &sample->range[text->rgb[k]];
+        const prep_text_range *r = &sample->range[plan->rgb[k]];
         if (r->max > max) max = r->max;
         if (r->min < low) low = r->min;
         is_integer = is_integer && r->is_integer;
     }
-    text->rgb_scale = !is_integer && max <= 1 ? 255 : max > 255 ? 255.0 / 65535 : 1;
+    plan->rgb_scale = !is_integer && max <= 1 ? 255 : max > 255 ? 255.0 / 65535 : 1;
     scan->info.has_rgb = max > 0;
     if (!scan->info.has_rgb) {
-        text->rgb_scale = 0;
-        return;
-    }
-    if (is_integer && max > 255 && max <= 65535 && low >= 0)
-        add_target(scan, text, "rgb", MOSPT_U16, text->rgb, 3);
+        plan->rgb_scale = 0;
+        add_shown_colour(scan, text);
+    } else if (is_integer && max > 255 && max <= 65535 && low >= 0)
+        add_target(scan, text, "rgb", MOSPT_U16, plan->rgb, 3);
     else if (!is_integer || max > 65535 || low < 0)
-        add_target(scan, text, "rgb_float", MOSPT_F32, text->rgb, 3);
+        add_target(scan, text, "rgb_float", MOSPT_F32, plan->rgb, 3);
+    else add_shown_colour(scan, text);
 }
 
 static bool add_intensity(prep_scan *scan, text_state *text, const text_sample *sample,
                           mospt_err *err)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     double *values = malloc(SAMPLE_MAX * sizeof *values);
     if (values == NULL) return mospt_err_nomem(err, SAMPLE_MAX * sizeof *values);
     size_t n = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
-        if (sample->columns[i] == sample->mode) values[n++] = sample->values[i][text->intensity];
+        if (sample->columns[i] == sample->mode) values[n++] = sample->values[i][plan->intensity];
     }
-    text->tone = prep_tone_make(values, n);
+    plan->tone = prep_tone_make(values, n);
     free(values);
-    scan->info.has_intensity = !text->tone.is_flat;
-    mospt_type type = fit_type(&sample->range[text->intensity], MOSPT_U16, true);
-    add_target(scan, text, "intensity", type, &text->intensity, 1);
+    scan->info.has_intensity = !plan->tone.is_flat;
+    mospt_type type = fit_type(&sample->range[plan->intensity], MOSPT_U16, true);
+    add_target(scan, text, "intensity", type, &plan->intensity, 1);
     return true;
 }
 
@@ -394,14 +410,15 @@ static void find_three(const prep_text_columns *columns, prep_text_meaning first
 static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sample,
                         mospt_err *err)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     const prep_text_columns *columns = &text->columns;
     int normal[3];
-    find_three(columns, PREP_TEXT_X, text->xyz);
-    find_three(columns, PREP_TEXT_R, text->rgb);
+    find_three(columns, PREP_TEXT_X, plan->xyz);
+    find_three(columns, PREP_TEXT_R, plan->rgb);
     find_three(columns, PREP_TEXT_NX, normal);
-    text->intensity = prep_text_columns_find(columns, PREP_TEXT_INTENSITY);
-    if (text->intensity >= 0 && !add_intensity(scan, text, sample, err)) return false;
-    if (text->rgb[0] >= 0) add_colour(scan, text, sample);
+    plan->intensity = prep_text_columns_find(columns, PREP_TEXT_INTENSITY);
+    if (plan->intensity >= 0 && !add_intensity(scan, text, sample, err)) return false;
+    if (plan->rgb[0] >= 0) add_colour(scan, text, sample);
     if (normal[0] >= 0) add_target(scan, text, "normal", MOSPT_F32, normal, 3);
     for (uint32_t c = 0; c < columns->count; c++) {
         int column = (int)c;
@@ -415,14 +432,15 @@ static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sa
 /* Columns of labels cannot be kept; columns at the end of the names that no line has are none. */
 static void find_needed(text_state *text, const text_sample *sample)
 {
+    prep_text_plan *plan = &text->blocks.plan;
     prep_text_columns *columns = &text->columns;
     if (columns->count > sample->mode) columns->count = sample->mode;
     for (uint32_t c = 0; c < columns->count; c++) {
         prep_text_meaning *meaning = &columns->column[c].meaning;
         if (*meaning == PREP_TEXT_ATTRIBUTE && sample->range[c].is_word) *meaning = PREP_TEXT_SKIP;
         if (*meaning == PREP_TEXT_SKIP) continue;
-        text->needed = c + 1;
-        text->needed_mask |= 1ull << c;
+        plan->needed = c + 1;
+        plan->needed_mask |= 1ull << c;
     }
 }
 
@@ -436,7 +454,8 @@ static bool understand(prep_scan *scan, text_sample *sample, const char *option,
         if (prep_text_columns_find(&text->columns, (prep_text_meaning)m) < 0)
             return refuse(scan, sample, err);
     }
-    text->has_counts = sample->is_counted;
+    text->blocks.plan.has_counts = sample->is_counted;
+    text->blocks.plan.schema = &scan->info.attributes;
     uint64_t room = prep_input_size(scan->input) / 6 +
                     1; /* a point takes at least "0 0 0" and the end of a line */
     if (sample->counted < room) scan->info.point_count = sample->counted;
@@ -464,99 +483,74 @@ static bool text_open(prep_scan *scan, uint32_t index, const prep_scan_options *
     return ok;
 }
 
-static void store(const text_state *text, const double *values, prep_batch *batch)
+/* Adds up what a new block holds besides points. */
+static void account(prep_scan *scan, text_state *text, const prep_text_block *block)
 {
-    size_t i = batch->count++;
-    uint8_t *rgbi = batch->rgbi + 4 * i;
-    for (int a = 0; a < 3; a++)
-        batch->xyz[3 * i + (size_t)a] = values[text->xyz[a]];
-    memset(rgbi,
-           text->intensity >= 0 && !text->tone.is_flat
-               ? prep_tone_apply(&text->tone, values[text->intensity])
-               : 255,
-           4);
-    if (text->rgb_scale > 0) {
-        prep_tone scale = {.scale = text->rgb_scale};
-        for (int c = 0; c < 3; c++)
-            rgbi[c] = prep_tone_apply(&scale, values[text->rgb[c]]);
-    }
-    for (uint32_t k = 0; k < text->target_count; k++) {
-        const text_target *t = &text->target[k];
-        uint8_t *out = batch->plane[t->plane] + i * batch->plane_size[t->plane];
-        mospt_type_write(t->type, values[t->column], out + t->component * mospt_type_size(t->type));
-    }
+    scan->dropped[PREP_DROP_UNREADABLE] += block->unreadable;
+    text->taken += block->points.count + block->unreadable; /* it is there, though of no use */
+    text->declared += block->declared;
+    if (block->count_line > 0) text->count_line = block->count_line;
+    text->last_line = block->lines.last_line;
+    if (block->lines.fault != NULL) text->fault = block->lines.fault;
+    if (block->fault_line > 0)
+        prep_scan_set_damage(scan, mospt_at_line(scan->path, block->fault_line), "%s",
+                             block->fault);
 }
 
 static void finish(prep_scan *scan, text_state *text)
 {
-    const char *fault = prep_input_fault(scan->input);
     text->is_at_end = true;
-    if (fault != NULL)
-        prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number), "%s", fault);
+    if (text->fault != NULL)
+        prep_scan_set_damage(scan, mospt_at_line(scan->path, text->last_line), "%s", text->fault);
     if (text->taken < text->declared)
         prep_scan_set_damage(scan, mospt_at_line(scan->path, text->count_line),
                              "%" PRIu64 " points are announced, %" PRIu64 " are there",
                              text->declared, text->taken);
 }
 
-/* A line that is no point: a count that announces the next block, or one that cannot be read. */
-static void take_other(prep_scan *scan, text_state *text, uint32_t columns, const double *values,
-                       uint64_t words)
+/* Copies points of the block to the batch, as many as it has room for. */
+static void hand_out(prep_text_block *block, prep_batch *batch)
 {
-    if (text->has_counts && columns == 1 && words == 0 && values[0] >= 0 && values[0] < 1e15) {
-        text->declared += (uint64_t)values[0];
-        text->count_line = text->lines.number;
-        return;
+    const prep_batch *from = &block->points;
+    size_t first = block->handed_out, at = batch->count, n = from->count - first;
+    if (n > batch->capacity - at) n = batch->capacity - at;
+    memcpy(batch->xyz + 3 * at, from->xyz + 3 * first, n * 3 * sizeof *batch->xyz);
+    memcpy(batch->rgbi + 4 * at, from->rgbi + 4 * first, n * 4);
+    for (uint32_t k = 0; k < batch->plane_count; k++) {
+        size_t size = batch->plane_size[k];
+        memcpy(batch->plane[k] + at * size, from->plane[k] + first * size, n * size);
     }
-    scan->dropped[PREP_DROP_UNREADABLE]++;
-    text->taken++; /* it is there, though it cannot be used */
-    const char *fault = prep_input_fault(scan->input);
-    if (fault != NULL && text->lines.begin == text->lines.end) /* the line that it cut */
-        prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number), "%s", fault);
-    prep_scan_set_damage(scan, mospt_at_line(scan->path, text->lines.number),
-                         "not a point: %u column%s%s, %u are needed", columns,
-                         columns == 1 ? "" : "s",
-                         (words & text->needed_mask) != 0 ? " with words" : "", text->needed);
+    batch->count += (uint32_t)n;
+    block->handed_out += (uint32_t)n;
 }
 
 static bool text_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     text_state *text = scan->state;
-    if (text->lines.buffer == NULL &&
-        !prep_lines_init(&text->lines, scan->input, LINE_BUFFER_SIZE, 0, err))
-        return false;
     while (batch->count < batch->capacity && !text->is_at_end) {
-        const char *line;
-        size_t length;
-        double values[PREP_TEXT_COLUMNS_MAX];
-        uint64_t words;
-        if (!prep_lines_next(&text->lines, &line, &length, err)) return false;
-        if (line == NULL) {
-            finish(scan, text);
-            break;
+        if (text->block != NULL && text->block->handed_out < text->block->points.count) {
+            hand_out(text->block, batch);
+            continue;
         }
-        strip_mark(&text->lines, &line, &length);
-        if (text->lines.number == text->header_line || is_comment(line, line + length)) continue;
-        uint32_t columns = prep_text_split(line, line + length, values, &words);
-        if (columns == 0) continue;
-        bool is_point = columns >= text->needed && columns <= PREP_TEXT_COLUMNS_MAX &&
-                        (words & text->needed_mask) == 0;
-        if (is_point) {
-            store(text, values, batch);
-            text->taken++;
-        } else {
-            take_other(scan, text, columns, values, words);
-        }
+        if (!prep_text_blocks_next(&text->blocks, scan->input, &text->block, err)) return false;
+        if (text->block != NULL) account(scan, text, text->block);
+        else finish(scan, text);
     }
     return true;
 }
 
+static void stop(text_state *text)
+{
+    prep_text_blocks_stop(&text->blocks);
+    text->block = NULL;
+    text->declared = text->taken = text->count_line = text->last_line = 0;
+    text->fault = NULL;
+    text->is_at_end = false;
+}
+
 static bool text_rewind(prep_scan *scan, mospt_err *err)
 {
-    text_state *text = scan->state;
-    prep_lines_fini(&text->lines);
-    text->declared = text->taken = text->count_line = 0;
-    text->is_at_end = false;
+    stop(scan->state);
     return prep_input_seek(scan->input, 0, err);
 }
 
@@ -564,7 +558,7 @@ static void text_close(prep_scan *scan)
 {
     text_state *text = scan->state;
     if (text == NULL) return;
-    prep_lines_fini(&text->lines);
+    stop(text);
     free(text);
 }
 

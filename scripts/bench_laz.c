@@ -32,8 +32,8 @@ static bool decode(prep_laz *laz, size_t length, pass *out, mospt_err *err)
     pass p = {.wall_s = -seconds(CLOCK_MONOTONIC), .cpu_s = -seconds(CLOCK_PROCESS_CPUTIME_ID)};
     do {
         if (!prep_laz_read(laz, 65536, &records, &got, err)) return false;
-        for (size_t i = 0; i < got * length; i += 61)
-            p.sum = p.sum * 31 + records[i];
+        for (size_t i = 0; i < got; i++)
+            p.sum = p.sum * 31 + records[i * length] + records[i * length + length - 1];
         p.count += got;
     } while (got > 0);
     p.wall_s += seconds(CLOCK_MONOTONIC);
@@ -45,7 +45,7 @@ static bool decode(prep_laz *laz, size_t length, pass *out, mospt_err *err)
 static bool bench(prep_input *input, const prep_las_header *h, uint32_t threads, pass *best,
                   mospt_err *err)
 {
-    prep_laz *laz;
+    prep_laz *laz = NULL;
     if (!prep_laz_open(input, h, threads, &laz, err)) return false;
     bool ok = true;
     for (int i = 0; i < PASSES && ok; i++, prep_laz_rewind(laz)) {
@@ -66,8 +66,8 @@ static bool bench(prep_input *input, const prep_las_header *h, uint32_t threads,
 
 static bool bench_file(const char *path, mospt_err *err)
 {
-    prep_input *input;
-    prep_las_header h;
+    prep_input *input = NULL;
+    prep_las_header h = {0};
     if (!prep_input_open(path, &input, err)) return false;
     bool ok = prep_las_header_read(input, &h, err);
     pass best = {0};

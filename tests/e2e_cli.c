@@ -241,6 +241,59 @@ static void json_of_names_that_are_no_text_parses(void **state)
     json_decref(json);
 }
 
+static void a_scan_file_says_what_is_in_it(void **state)
+{
+    (void)state;
+    make_las("a.las", 1000);
+    expect("info a.las --json", DONE);
+    json_t *json = parse_output();
+    assert_int_equal(integer_at(json, "points"), 1000);
+    json_decref(json);
+    make_text("b.xyz", "1 2 3\n4 5 6\n7 8 9\n");
+    make_text("b.pose.txt", "1 0 0 100  0 1 0 200  0 0 1 300  0 0 0 1\n");
+    expect("info b.xyz", DONE);
+    assert_non_null(strstr(out, "101.000  202.000  303.000"));
+    make_text("b.pose.txt", "1 0 0\n");
+    expect("info b.xyz", FAILED);
+    assert_non_null(strstr(said, "b.pose.txt: "));
+}
+
+static void each_file_becomes_a_dataset_once(void **state)
+{
+    (void)state;
+    make_las("a.las", 1000);
+    make_text("b.xyz", "1 2 3\n4 5 6\n");
+    make_text("c.las", "LASF");
+    for (int round = 0; round < 2; round++) {
+        expect("build --each a.las b.xyz c.las -o each --json", LEFT_OUT);
+        json_t *json = parse_output(), *files = json_object_get(json, "files");
+        assert_int_equal(json_array_size(files), 3);
+        const char *wanted[3] = {round == 0 ? "built" : "up to date", round == 0 ? "built" : "up to date", "failed"};
+        for (size_t i = 0; i < 3; i++)
+            assert_string_equal(json_string_value(json_object_get(json_array_get(files, i), "status")), wanted[i]);
+        json_decref(json);
+    }
+    expect("check each/a.las.ipts", DONE);
+    expect("build --each c.las -o each", FAILED);
+}
+
+static void what_is_outside_the_crop_is_counted(void **state)
+{
+    (void)state;
+    make_text("b.xyz", "1 2 3\n4 5 6\n7 8 9\n");
+    expect("build b.xyz -o site.ipts --crop 0,0,0,5,5,10 --crs EPSG:25832 --json", DONE);
+    json_t *json = parse_output();
+    assert_int_equal(integer_at(json, "points"), 2);
+    assert_int_equal(integer_at(json, "dropped"), 1);
+    json_decref(json);
+    expect("info site.ipts --json", DONE);
+    json = parse_output();
+    assert_string_equal(json_string_value(json_object_get(json, "crs")), "EPSG:25832");
+    json_decref(json);
+    expect("build b.xyz -o none.ipts --crop 50,50,50,60,60,60", FAILED);
+    expect("build b.xyz -o none.ipts --crop 5,0,0,1,1,1", WRONG_USE);
+}
+
 static void input_left_out_is_exit_code_3(void **state)
 {
     (void)state;
@@ -264,7 +317,7 @@ static void failures_are_exit_code_1_and_one_sentence(void **state)
 {
     static const char *const failing[] = {
         "build missing.las -o x.ipts", "build b.las -o x.ipts", "build a.las -o nowhere/x.ipts", "build a.las -o x.ipts --temp-dir nowhere",
-        "build a.las -o x.ipts --memory 1M", "build a.las -o full", "build a.las -o full --force", "info missing.ipts", "info full", "check full -q", "info a.las",
+        "build a.las -o x.ipts --memory 1M", "build a.las -o full", "build a.las -o full --force", "info missing.ipts", "info full", "check full -q", "info b.las",
     };
     (void)state;
     make_las("a.las", 10);
@@ -395,6 +448,9 @@ int main(int argc, char **argv)
         CASE(a_site_is_built_told_and_checked),
         CASE(json_is_all_there_is_on_standard_output),
         CASE(json_of_names_that_are_no_text_parses),
+        CASE(a_scan_file_says_what_is_in_it),
+        CASE(each_file_becomes_a_dataset_once),
+        CASE(what_is_outside_the_crop_is_counted),
         CASE(input_left_out_is_exit_code_3),
         CASE(failures_are_exit_code_1_and_one_sentence),
         CASE(check_names_what_is_damaged),

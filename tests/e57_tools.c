@@ -69,7 +69,7 @@ bool e57_load_scan(const char *path, uint32_t index, uint32_t capacity, e57_load
     assert_true(prep_scan_read(scan, &out->batch, err));
     memcpy(out->dropped, prep_scan_dropped(scan), sizeof out->dropped);
     if (prep_scan_damage(scan) != NULL) out->damage = *prep_scan_damage(scan);
-    snprintf(out->crs, sizeof out->crs, "%s", prep_e57_crs(scan));
+    snprintf(out->crs, sizeof out->crs, "%.255s", prep_scan_describe(scan)->crs);
     prep_scan_close(scan);
     return true;
 }

@@ -1,5 +1,5 @@
 # Tests of the LAZ decoder. Included by tests/CMakeLists.txt, behind readers.cmake.
-add_executable(test_laz test_laz.c write_laz.c)
+add_executable(test_laz test_laz.c write_laz.c write_laz_coder.c)
 target_link_libraries(test_laz PRIVATE readers_fixture)
 add_test(NAME test_laz COMMAND test_laz)
 

@@ -168,7 +168,7 @@ typedef struct {
     bool refused; /* the commit itself sees it */
 } liar;
 
-static uint64_t findings_of(const liar *l)
+static uint64_t findings_of(const liar *l, mospt_err *first)
 {
     char *path = core_path(folder, "liar.ipts");
     prep_shape shape = core_shape(&site, DEPTH, THRESHOLD);
@@ -196,7 +196,7 @@ static uint64_t findings_of(const liar *l)
     assert_int_equal(committed, !l->refused);
     mospt_metadata_fini(&metadata);
     mospt_writer_destroy(writer);
-    if (committed) findings = core_findings(path, NULL);
+    if (committed) findings = core_findings(path, first);
     if (committed) core_folder_remove(path);
     else free(path);
     prep_subtree_fini(&made);
@@ -265,11 +265,30 @@ static void a_liar_with_the_right_checksums_is_found(void **state)
         {"schema", {.metadata = metadata_schema}},
     };
     (void)state;
-    assert_int_equal(findings_of(&truth), 0);
+    assert_int_equal(findings_of(&truth, NULL), 0);
     for (size_t k = 0; k < sizeof lies / sizeof lies[0]; k++) {
-        uint64_t findings = findings_of(&lies[k].lie);
+        uint64_t findings = findings_of(&lies[k].lie, NULL);
         if (findings == 0 && !lies[k].lie.refused) fail_msg("a wrong %s is not found", lies[k].name);
     }
+}
+
+/* Into the cube beside that of its node: what is looked at inside the node stays as it was. */
+static void payload_beside(uint8_t *p, mospt_node *n, uint32_t i)
+{
+    uint32_t x;
+    if (i != 1) return;
+    memcpy(&x, p, sizeof x);
+    x ^= UINT32_C(1) << (site.grid.bits - n->level);
+    memcpy(p, &x, sizeof x);
+}
+
+static void a_point_outside_the_cube_of_its_node_is_found(void **state)
+{
+    static const liar lie = {.payload = payload_beside};
+    mospt_err first;
+    (void)state;
+    assert_true(findings_of(&lie, &first) > 0);
+    assert_non_null(strstr(first.message, "outside the cube"));
 }
 
 static bool stop_at_two(void *context, uint32_t done, uint32_t total)
@@ -351,6 +370,7 @@ int main(void)
         cmocka_unit_test(swapped_files_are_found),
         cmocka_unit_test(what_is_read_is_what_was_put_in),
         cmocka_unit_test(a_liar_with_the_right_checksums_is_found),
+        cmocka_unit_test(a_point_outside_the_cube_of_its_node_is_found),
         cmocka_unit_test(a_check_can_be_stopped),
         cmocka_unit_test(a_writer_refuses_what_it_must_not_overwrite),
         cmocka_unit_test(a_writer_takes_over_what_a_killed_build_left),

@@ -2,209 +2,10 @@
 
 #include "preprocess/bytes.h"
 #include "tests/write_las.h"
+#include "tests/write_laz_coder.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct {
-    uint8_t *p;
-    size_t size, capacity;
-} bytes;
-
-static void append(bytes *b, const void *p, size_t size)
-{
-    if (b->size + size > b->capacity) {
-        b->capacity = 2 * (b->size + size);
-        b->p = realloc(b->p, b->capacity);
-        if (b->p == NULL) abort();
-    }
-    if (size > 0) memcpy(b->p + b->size, p, size);
-    b->size += size;
-}
-
-static void append_u32(bytes *b, uint32_t v)
-{
-    uint8_t p[4];
-    write_las_u32(p, v);
-    append(b, p, 4);
-}
-
-/* Models live until the next chunk begins. */
-typedef struct model {
-    struct model *next;
-    uint32_t symbols, total, cycle, left;
-    uint32_t count[516], low[516];
-} model;
-
-static model *all_models;
-
-static void distribute(model *m)
-{
-    uint32_t sum = 0, scale = 0x80000000u / m->total;
-    for (uint32_t i = 0; i < m->symbols; sum += m->count[i++])
-        m->low[i] = scale * sum >> 16;
-}
-
-static model *make_model(uint32_t symbols)
-{
-    model *m = calloc(1, sizeof *m);
-    if (m == NULL) abort();
-    m->next = all_models;
-    all_models = m;
-    m->symbols = m->total = symbols;
-    m->cycle = m->left = (symbols + 6) / 2;
-    for (uint32_t i = 0; i < symbols; i++)
-        m->count[i] = 1;
-    distribute(m);
-    return m;
-}
-
-static void free_models(void)
-{
-    while (all_models != NULL) {
-        model *next = all_models->next;
-        free(all_models);
-        all_models = next;
-    }
-}
-
-typedef struct {
-    bytes out;
-    uint32_t base, length;
-    bool is_needed; /* layers: some value differs from the first */
-} coder;
-
-static void begin_coder(coder *c)
-{
-    c->out.size = 0;
-    c->base = 0;
-    c->length = 0xffffffffu;
-    c->is_needed = false;
-}
-
-static void raise_base(coder *c, uint32_t by)
-{
-    uint32_t base = c->base + by;
-    if (base < by) {
-        size_t i = c->out.size;
-        while (c->out.p[--i] == 255)
-            c->out.p[i] = 0;
-        c->out.p[i]++;
-    }
-    c->base = base;
-}
-
-static void put_due_bytes(coder *c)
-{
-    for (; c->length < 1u << 24; c->length <<= 8, c->base <<= 8) {
-        uint8_t top = (uint8_t)(c->base >> 24);
-        append(&c->out, &top, 1);
-    }
-}
-
-static void end_coder(coder *c)
-{
-    static const uint8_t zeros[3] = {0};
-    bool one_more = c->length > 2u << 24;
-    raise_base(c, one_more ? 1u << 24 : 1u << 23);
-    c->length = one_more ? 1u << 23 : 1u << 15;
-    put_due_bytes(c);
-    append(&c->out, zeros, one_more ? 3 : 2);
-}
-
-static void put_symbol(coder *c, model **slot, uint32_t symbols, uint32_t symbol)
-{
-    if (*slot == NULL) *slot = make_model(symbols);
-    model *m = *slot;
-    uint32_t unit = c->length >> 15, low = m->low[symbol] * unit;
-    c->length = symbol + 1 == symbols ? c->length - low : m->low[symbol + 1] * unit - low;
-    raise_base(c, low);
-    put_due_bytes(c);
-    m->count[symbol]++;
-    if (--m->left > 0) return;
-    m->total += m->cycle;
-    if (m->total > 32768) {
-        m->total = 0;
-        for (uint32_t i = 0; i < symbols; i++)
-            m->total += m->count[i] = (m->count[i] + 1) / 2;
-    }
-    distribute(m);
-    m->cycle = 5 * m->cycle / 4 < 8 * (symbols + 6) ? 5 * m->cycle / 4 : 8 * (symbols + 6);
-    m->left = m->cycle;
-}
-
-static void put_bits(coder *c, uint32_t bits, uint32_t value)
-{
-    if (bits > 19) {
-        put_bits(c, 16, value & 65535);
-        value >>= 16;
-        bits -= 16;
-    }
-    c->length >>= bits;
-    raise_base(c, value * c->length);
-    put_due_bytes(c);
-}
-
-static void put_bits_64(coder *c, uint64_t value)
-{
-    put_bits(c, 32, (uint32_t)value);
-    put_bits(c, 32, (uint32_t)(value >> 32));
-}
-
-typedef struct {
-    uint32_t k;
-    bool is_begun;
-    uint32_t zeros, total, part, cycle, left; /* of the one bit */
-    model *value[33];
-} integer;
-
-static void put_one_bit(coder *c, integer *n, uint32_t bit)
-{
-    if (!n->is_begun) {
-        n->is_begun = true;
-        n->zeros = 1, n->total = 2, n->part = 4096, n->cycle = n->left = 4;
-    }
-    uint32_t zero = n->part * (c->length >> 13);
-    if (bit) {
-        raise_base(c, zero);
-        c->length -= zero;
-    } else {
-        c->length = zero;
-        n->zeros++;
-    }
-    put_due_bytes(c);
-    if (--n->left > 0) return;
-    n->total += n->cycle;
-    if (n->total > 8192) {
-        n->total = (n->total + 1) / 2;
-        n->zeros = (n->zeros + 1) / 2;
-        if (n->zeros == n->total) n->total++;
-    }
-    n->part = 0x80000000u / n->total * n->zeros >> 18;
-    n->cycle = n->left = 5 * n->cycle / 4 < 64 ? 5 * n->cycle / 4 : 64;
-}
-
-static void put_integer(coder *c, integer *n, uint32_t bits, model **context, uint32_t predicted,
-                        uint32_t real)
-{
-    int64_t correction = (int32_t)(real - predicted);
-    if (bits < 32) {
-        int64_t range = INT64_C(1) << bits;
-        correction = (int64_t)(uint32_t)((real - predicted) & (uint32_t)(range - 1));
-        if (correction >= range / 2) correction -= range;
-    }
-    uint64_t size = (uint64_t)(correction <= 0 ? -correction : correction - 1);
-    for (n->k = 0; size >> n->k != 0;)
-        n->k++;
-    put_symbol(c, context, bits + 1, n->k);
-    if (n->k == 0) put_one_bit(c, n, (uint32_t)correction);
-    if (n->k == 0 || n->k == 32) return;
-    uint32_t code =
-        (uint32_t)(correction < 0 ? correction + (INT64_C(1) << n->k) - 1 : correction - 1);
-    uint32_t low = n->k > 8 ? n->k - 8 : 0;
-    put_symbol(c, &n->value[n->k], 1u << (n->k - low), code >> low);
-    if (low > 0) put_bits(c, low, code & ((1u << low) - 1));
-}
 
 typedef struct {
     int32_t v[5];
@@ -241,8 +42,8 @@ typedef struct {
     uint32_t at, newest;
     uint64_t time[4];
     int32_t step[4], extremes[4];
-    model *first, *multiple, *context[9];
-    integer n;
+    write_laz_model *first, *multiple, *context[9];
+    write_laz_number n;
 } gps_state;
 
 static void doubt(gps_state *g, int32_t delta)
@@ -267,30 +68,30 @@ static uint32_t find_sequence(const gps_state *g, uint64_t time)
     return 0;
 }
 
-static void put_gps(coder *c, gps_state *g, uint64_t time, bool has_same)
+static void put_gps(write_laz_coder *c, gps_state *g, uint64_t time, bool has_same)
 {
     uint32_t i = g->at, same = has_same, sym;
     int32_t step = g->step[i], delta = (int32_t)(time - g->time[i]);
-    model **slot = step == 0 ? &g->first : &g->multiple;
+    write_laz_model **slot = step == 0 ? &g->first : &g->multiple;
     uint32_t symbols = (step == 0 ? 5 : 515) + same, far = step == 0 ? 1 + same : 511 + same;
     if (has_same && time == g->time[i]) {
-        put_symbol(c, slot, symbols, step == 0 ? 0 : 511);
+        write_laz_symbol(c, slot, symbols, step == 0 ? 0 : 511);
     } else if (!is_near(time, g->time[i])) {
         uint32_t hops = find_sequence(g, time);
-        put_symbol(c, slot, symbols, far + hops);
+        write_laz_symbol(c, slot, symbols, far + hops);
         if (hops > 0) {
             g->at = (i + hops) & 3;
             put_gps(c, g, time, has_same);
             return;
         }
-        put_integer(c, &g->n, 32, &g->context[8], (uint32_t)(g->time[i] >> 32),
-                    (uint32_t)(time >> 32));
-        put_bits(c, 32, (uint32_t)time);
+        write_laz_integer(c, &g->n, 32, &g->context[8], (uint32_t)(g->time[i] >> 32),
+                          (uint32_t)(time >> 32));
+        write_laz_bits(c, 32, (uint32_t)time);
         g->newest = g->at = (g->newest + 1) & 3;
         g->step[g->at] = g->extremes[g->at] = 0;
     } else if (step == 0) {
-        put_symbol(c, slot, symbols, same);
-        put_integer(c, &g->n, 32, &g->context[0], 0, (uint32_t)delta);
+        write_laz_symbol(c, slot, symbols, same);
+        write_laz_integer(c, &g->n, 32, &g->context[0], 0, (uint32_t)delta);
         g->step[i] = delta;
         g->extremes[i] = 0;
     } else {
@@ -306,52 +107,52 @@ static void put_gps(coder *c, gps_state *g, uint64_t time, bool has_same)
                            : multi < 10  ? 2
                            : multi < 500 ? 3
                                          : 4;
-        put_symbol(c, slot, symbols, sym);
-        put_integer(c, &g->n, 32, &g->context[context], (uint32_t)multi * (uint32_t)step,
-                    (uint32_t)delta);
+        write_laz_symbol(c, slot, symbols, sym);
+        write_laz_integer(c, &g->n, 32, &g->context[context], (uint32_t)multi * (uint32_t)step,
+                          (uint32_t)delta);
         if (multi == 1) g->extremes[i] = 0;
         if (multi == 0 || multi == 500 || multi == -10) doubt(g, delta);
     }
     g->time[g->at] = time;
 }
 
-static void put_old_gps(coder *c, gps_state *g, uint64_t time)
+static void put_old_gps(write_laz_coder *c, gps_state *g, uint64_t time)
 {
     bool near = is_near(time, g->time[0]);
     int32_t step = g->step[0], delta = (int32_t)(time - g->time[0]);
     if (step == 0) {
-        put_symbol(c, &g->first, 3, time == g->time[0] ? 0 : near ? 1 : 2);
+        write_laz_symbol(c, &g->first, 3, time == g->time[0] ? 0 : near ? 1 : 2);
         if (near && time != g->time[0]) {
-            put_integer(c, &g->n, 32, &g->context[0], 0, (uint32_t)delta);
+            write_laz_integer(c, &g->n, 32, &g->context[0], 0, (uint32_t)delta);
             g->step[0] = delta;
         }
     } else if (time == g->time[0]) {
-        put_symbol(c, &g->multiple, 512, 511);
+        write_laz_symbol(c, &g->multiple, 512, 511);
     } else if (near) {
         double times = (double)delta / step;
         uint32_t multi = times >= 508.5 ? 509 : times < 0.5 ? 0 : (uint32_t)(times + 0.5);
         uint32_t predicted = multi == 0 ? (uint32_t)(step / 4) : multi * (uint32_t)step;
-        put_symbol(c, &g->multiple, 512, multi);
-        put_integer(c, &g->n, 32,
-                    &g->context[multi == 1   ? 1
-                                : multi == 0 ? 2
-                                : multi < 10 ? 3
-                                : multi < 50 ? 4
-                                             : 5],
-                    predicted, (uint32_t)delta);
+        write_laz_symbol(c, &g->multiple, 512, multi);
+        write_laz_integer(c, &g->n, 32,
+                          &g->context[multi == 1   ? 1
+                                      : multi == 0 ? 2
+                                      : multi < 10 ? 3
+                                      : multi < 50 ? 4
+                                                   : 5],
+                          predicted, (uint32_t)delta);
         if (multi == 1) g->step[0] = delta, g->extremes[0] = 0;
         if (multi == 0 || multi == 509) doubt(g, delta);
     } else {
-        put_symbol(c, &g->multiple, 512, 510);
+        write_laz_symbol(c, &g->multiple, 512, 510);
     }
-    if (!near) put_bits_64(c, time);
+    if (!near) write_laz_bits_64(c, time);
     g->time[0] = time;
 }
 
 typedef struct {
-    model *changed, *byte[6];
-    integer n;
-    model *context[6];
+    write_laz_model *changed, *byte[6];
+    write_laz_number n;
+    write_laz_model *context[6];
 } rgb_state;
 
 static int32_t clamp_8(int32_t v)
@@ -359,7 +160,7 @@ static int32_t clamp_8(int32_t v)
     return v < 0 ? 0 : v > 255 ? 255 : v;
 }
 
-static void put_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *p)
+static void put_rgb(write_laz_coder *c, rgb_state *s, const uint8_t *last, const uint8_t *p)
 {
     static const uint8_t order[6] = {0, 1, 2, 4, 3, 5};
     uint32_t changed = 0;
@@ -367,53 +168,53 @@ static void put_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *
         changed |= (uint32_t)(last[i] != p[i]) << i;
     bool is_grey = p[0] == p[2] && p[0] == p[4] && p[1] == p[3] && p[1] == p[5];
     if (!is_grey) changed |= 64;
-    put_symbol(c, &s->changed, 128, changed);
+    write_laz_symbol(c, &s->changed, 128, changed);
     for (uint32_t k = 0; k < 6; k++) {
         uint32_t i = order[k], at = i & 1;
         if (!(changed >> i & 1) || (i > 1 && is_grey)) continue;
         int32_t move = p[at] - last[at], predicted = last[i];
         if (i > 3) move = (move + p[2 + at] - last[2 + at]) / 2;
         if (i > 1) predicted = clamp_8(predicted + move);
-        put_symbol(c, &s->byte[i], 256, (uint32_t)(p[i] - predicted) & 255);
+        write_laz_symbol(c, &s->byte[i], 256, (uint32_t)(p[i] - predicted) & 255);
     }
 }
 
-static void put_old_rgb(coder *c, rgb_state *s, const uint8_t *last, const uint8_t *p)
+static void put_old_rgb(write_laz_coder *c, rgb_state *s, const uint8_t *last, const uint8_t *p)
 {
     uint32_t changed = 0;
     for (uint32_t i = 0; i < 6; i++)
         changed |= (uint32_t)(last[i] != p[i]) << i;
-    put_symbol(c, &s->changed, 64, changed);
+    write_laz_symbol(c, &s->changed, 64, changed);
     for (uint32_t i = 0; i < 6; i++) {
-        if (changed >> i & 1) put_integer(c, &s->n, 8, &s->context[i], last[i], p[i]);
+        if (changed >> i & 1) write_laz_integer(c, &s->n, 8, &s->context[i], last[i], p[i]);
     }
 }
 
 typedef struct {
-    model *index, *how[4], *context[6];
+    write_laz_model *index, *how[4], *context[6];
     uint32_t how_last, step;
-    integer offset, size, location, xyz;
+    write_laz_number offset, size, location, xyz;
 } wave_state;
 
-static void put_wave(coder *c, wave_state *w, const uint8_t *last, const uint8_t *p)
+static void put_wave(write_laz_coder *c, wave_state *w, const uint8_t *last, const uint8_t *p)
 {
     uint64_t move = prep_le64(p + 1) - prep_le64(last + 1);
     uint32_t how = move == 0                        ? 0
                    : move == prep_le32(last + 9)    ? 1
                    : (int64_t)move == (int32_t)move ? 2
                                                     : 3;
-    put_symbol(c, &w->index, 256, p[0]);
-    put_symbol(c, &w->how[w->how_last], 4, how);
+    write_laz_symbol(c, &w->index, 256, p[0]);
+    write_laz_symbol(c, &w->how[w->how_last], 4, how);
     w->how_last = how;
     if (how == 2)
-        put_integer(c, &w->offset, 32, &w->context[0], w->step, (uint32_t)move),
+        write_laz_integer(c, &w->offset, 32, &w->context[0], w->step, (uint32_t)move),
             w->step = (uint32_t)move;
-    if (how == 3) put_bits_64(c, prep_le64(p + 1));
-    put_integer(c, &w->size, 32, &w->context[1], prep_le32(last + 9), prep_le32(p + 9));
-    put_integer(c, &w->location, 32, &w->context[2], prep_le32(last + 13), prep_le32(p + 13));
+    if (how == 3) write_laz_bits_64(c, prep_le64(p + 1));
+    write_laz_integer(c, &w->size, 32, &w->context[1], prep_le32(last + 9), prep_le32(p + 9));
+    write_laz_integer(c, &w->location, 32, &w->context[2], prep_le32(last + 13), prep_le32(p + 13));
     for (uint32_t a = 0; a < 3; a++)
-        put_integer(c, &w->xyz, 32, &w->context[3 + a], prep_le32(last + 17 + 4 * a),
-                    prep_le32(p + 17 + 4 * a));
+        write_laz_integer(c, &w->xyz, 32, &w->context[3 + a], prep_le32(last + 17 + 4 * a),
+                          prep_le32(p + 17 + 4 * a));
 }
 
 /* Where the parts of a record are. */
@@ -451,14 +252,14 @@ typedef struct {
     median mx[16], my[16];
     uint32_t height[8];
     uint16_t intensity[16];
-    model *changed, *bits[256], *class[256], *user[256], *angle[2];
-    integer x, y, z, i, s, a;
-    model *cx[2], *cy[22], *cz[20], *ci[4], *cs, *ca[2];
+    write_laz_model *changed, *bits[256], *class[256], *user[256], *angle[2];
+    write_laz_number x, y, z, i, s, a;
+    write_laz_model *cx[2], *cy[22], *cz[20], *ci[4], *cs, *ca[2];
     gps_state gps;
     rgb_state rgb;
     wave_state wave;
-    integer extra;
-    model *extra_model[4096];
+    write_laz_number extra;
+    write_laz_model *extra_model[4096];
 } rows_state;
 
 static uint32_t changes(const uint8_t *last, const uint8_t *p, bool has_intensity,
@@ -471,25 +272,29 @@ static uint32_t changes(const uint8_t *last, const uint8_t *p, bool has_intensit
     return bits | (memcmp(p + 18, last + 18, 2) != 0);
 }
 
-static void put_point(coder *c, rows_state *s, const uint8_t *last, const uint8_t *p)
+static void put_point(write_laz_coder *c, rows_state *s, const uint8_t *last, const uint8_t *p)
 {
     uint32_t r = p[14] & 7, n = p[14] >> 3 & 7, m = map_8[n][r], l = n > r ? n - r : r - n;
     uint16_t intensity = prep_le16(p + 12);
     uint32_t changed = changes(last, p, s->intensity[m] != intensity, false);
-    put_symbol(c, &s->changed, 64, changed);
-    if (changed & 32) put_symbol(c, &s->bits[last[14]], 256, p[14]);
-    if (changed & 16) put_integer(c, &s->i, 16, &s->ci[m < 3 ? m : 3], s->intensity[m], intensity);
+    write_laz_symbol(c, &s->changed, 64, changed);
+    if (changed & 32) write_laz_symbol(c, &s->bits[last[14]], 256, p[14]);
+    if (changed & 16)
+        write_laz_integer(c, &s->i, 16, &s->ci[m < 3 ? m : 3], s->intensity[m], intensity);
     s->intensity[m] = intensity;
-    if (changed & 8) put_symbol(c, &s->class[last[15]], 256, p[15]);
+    if (changed & 8) write_laz_symbol(c, &s->class[last[15]], 256, p[15]);
     if (changed & 4)
-        put_symbol(c, &s->angle[p[14] >> 6 & 1], 256, (uint32_t)(p[16] - last[16]) & 255);
-    if (changed & 2) put_symbol(c, &s->user[last[17]], 256, p[17]);
-    if (changed & 1) put_integer(c, &s->s, 16, &s->cs, prep_le16(last + 18), prep_le16(p + 18));
+        write_laz_symbol(c, &s->angle[p[14] >> 6 & 1], 256, (uint32_t)(p[16] - last[16]) & 255);
+    if (changed & 2) write_laz_symbol(c, &s->user[last[17]], 256, p[17]);
+    if (changed & 1)
+        write_laz_integer(c, &s->s, 16, &s->cs, prep_le16(last + 18), prep_le16(p + 18));
     uint32_t dx = prep_le32(p) - prep_le32(last), dy = prep_le32(p + 4) - prep_le32(last + 4),
              z = prep_le32(p + 8);
-    put_integer(c, &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
-    put_integer(c, &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2], dy);
-    put_integer(c, &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)], s->height[l], z);
+    write_laz_integer(c, &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
+    write_laz_integer(c, &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2],
+                      dy);
+    write_laz_integer(c, &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)],
+                      s->height[l], z);
     add_median(&s->mx[m], (int32_t)dx);
     add_median(&s->my[m], (int32_t)dy);
     s->height[l] = z;
@@ -504,32 +309,35 @@ static uint32_t middle(const int32_t v[3])
     return (uint32_t)v[2];
 }
 
-static void put_old_point(coder *c, rows_state *s, const uint8_t *last, const uint8_t *p)
+static void put_old_point(write_laz_coder *c, rows_state *s, const uint8_t *last, const uint8_t *p)
 {
     uint32_t dx = prep_le32(p) - prep_le32(last), dy = prep_le32(p + 4) - prep_le32(last + 4);
-    put_integer(c, &s->x, 32, &s->cx[0], middle(s->dx), dx);
-    put_integer(c, &s->y, 32, &s->cy[s->x.k < 19 ? s->x.k : 19], middle(s->dy), dy);
+    write_laz_integer(c, &s->x, 32, &s->cx[0], middle(s->dx), dx);
+    write_laz_integer(c, &s->y, 32, &s->cy[s->x.k < 19 ? s->x.k : 19], middle(s->dy), dy);
     uint32_t k = (s->x.k + s->y.k) / 2;
-    put_integer(c, &s->z, 32, &s->cz[k < 19 ? k : 19], prep_le32(last + 8), prep_le32(p + 8));
+    write_laz_integer(c, &s->z, 32, &s->cz[k < 19 ? k : 19], prep_le32(last + 8), prep_le32(p + 8));
     s->dx[s->count % 3] = (int32_t)dx;
     s->dy[s->count++ % 3] = (int32_t)dy;
     uint32_t changed = changes(last, p, memcmp(p + 12, last + 12, 2) != 0, true);
-    put_symbol(c, &s->changed, 64, changed);
-    if (changed & 32) put_integer(c, &s->i, 16, &s->ci[0], prep_le16(last + 12), prep_le16(p + 12));
-    if (changed & 16) put_symbol(c, &s->bits[last[14]], 256, p[14]);
-    if (changed & 8) put_symbol(c, &s->class[last[15]], 256, p[15]);
-    if (changed & 4) put_integer(c, &s->a, 8, &s->ca[k < 3], last[16], p[16]);
-    if (changed & 2) put_symbol(c, &s->user[last[17]], 256, p[17]);
-    if (changed & 1) put_integer(c, &s->s, 16, &s->cs, prep_le16(last + 18), prep_le16(p + 18));
+    write_laz_symbol(c, &s->changed, 64, changed);
+    if (changed & 32)
+        write_laz_integer(c, &s->i, 16, &s->ci[0], prep_le16(last + 12), prep_le16(p + 12));
+    if (changed & 16) write_laz_symbol(c, &s->bits[last[14]], 256, p[14]);
+    if (changed & 8) write_laz_symbol(c, &s->class[last[15]], 256, p[15]);
+    if (changed & 4) write_laz_integer(c, &s->a, 8, &s->ca[k < 3], last[16], p[16]);
+    if (changed & 2) write_laz_symbol(c, &s->user[last[17]], 256, p[17]);
+    if (changed & 1)
+        write_laz_integer(c, &s->s, 16, &s->cs, prep_le16(last + 18), prep_le16(p + 18));
 }
 
-static void put_rows(bytes *out, const parts *f, const uint8_t *records, size_t count, bool is_old)
+static void put_rows(write_laz_bytes *out, const parts *f, const uint8_t *records, size_t count,
+                     bool is_old)
 {
     rows_state *s = calloc(1, sizeof *s);
-    coder c = {0};
+    write_laz_coder c = {0};
     if (s == NULL) abort();
-    append(out, records, f->length);
-    begin_coder(&c);
+    write_laz_append(out, records, f->length);
+    write_laz_begin(&c);
     if (f->gps) s->gps.time[0] = prep_le64(records + f->gps);
     for (size_t i = 1; i < count; i++) {
         const uint8_t *p = records + i * f->length, *last = p - f->length;
@@ -540,15 +348,15 @@ static void put_rows(bytes *out, const parts *f, const uint8_t *records, size_t 
         if (f->wave) put_wave(&c, &s->wave, last + f->wave, p + f->wave);
         for (uint32_t k = 0; k < f->extra_size; k++) {
             uint8_t a = last[f->extra + k], b = p[f->extra + k];
-            if (is_old) put_integer(&c, &s->extra, 8, &s->extra_model[k], a, b);
-            else put_symbol(&c, &s->extra_model[k], 256, (uint32_t)(b - a) & 255);
+            if (is_old) write_laz_integer(&c, &s->extra, 8, &s->extra_model[k], a, b);
+            else write_laz_symbol(&c, &s->extra_model[k], 256, (uint32_t)(b - a) & 255);
         }
     }
-    end_coder(&c);
-    append(out, c.out.p, c.out.size);
+    write_laz_end(&c);
+    write_laz_append(out, c.out.p, c.out.size);
     free(c.out.p);
     free(s);
-    free_models();
+    write_laz_free_models();
 }
 
 /* ---- point formats 6 to 10 ---- */
@@ -593,15 +401,15 @@ typedef struct {
     median mx[12], my[12];
     uint32_t height[8];
     uint16_t intensity[8];
-    model *changed[8], *channel, *n[16], *r[16], *r_same, *cx[2], *cy[22], *cz[20], *class[64],
-        *flags[64], *user[64];
-    model *ci[4], *ca[2], *cs;
-    integer x, y, z, i, a, s;
+    write_laz_model *changed[8], *channel, *n[16], *r[16], *r_same, *cx[2], *cy[22], *cz[20],
+        *class[64], *flags[64], *user[64];
+    write_laz_model *ci[4], *ca[2], *cs;
+    write_laz_number x, y, z, i, a, s;
     gps_state gps;
     rgb_state rgb;
-    model *nir_changed, *nir[2];
+    write_laz_model *nir_changed, *nir[2];
     wave_state wave;
-    model *extra[4096];
+    write_laz_model *extra[4096];
 } channel_state;
 
 typedef struct {
@@ -609,7 +417,7 @@ typedef struct {
     bool is_4;
     uint32_t channel, item;
     channel_state ch[4];
-    coder c[LAYERS];
+    write_laz_coder c[LAYERS];
 } layers_state;
 
 static uint32_t flags_of(const uint8_t *p)
@@ -628,18 +436,18 @@ static void use_channel(channel_state *s, const uint8_t *first)
     s->gps.time[0] = prep_le64(first + 22);
 }
 
-static void put_returns(coder *c, channel_state *s, uint32_t last_n, uint32_t last_r, uint32_t n,
-                        uint32_t r, uint32_t changed)
+static void put_returns(write_laz_coder *c, channel_state *s, uint32_t last_n, uint32_t last_r,
+                        uint32_t n, uint32_t r, uint32_t changed)
 {
-    if (changed & 4) put_symbol(c, &s->n[last_n], 16, n);
+    if (changed & 4) write_laz_symbol(c, &s->n[last_n], 16, n);
     if ((changed & 3) != 3) return;
-    if (changed & 16) put_symbol(c, &s->r[last_r], 16, r);
-    else put_symbol(c, &s->r_same, 13, (r + 16 - last_r) % 16 - 2);
+    if (changed & 16) write_laz_symbol(c, &s->r[last_r], 16, r);
+    else write_laz_symbol(c, &s->r_same, 13, (r + 16 - last_r) % 16 - 2);
 }
 
 static void put_layers_point(layers_state *w, const uint8_t *p)
 {
-    coder *c = w->c;
+    write_laz_coder *c = w->c;
     channel_state *from = &w->ch[w->channel];
     uint32_t channel = p[15] >> 4 & 3, fr = from->last[14] & 15, fn = from->last[14] >> 4;
     uint32_t context = (fr == 1) | (uint32_t)(fr >= fn) << 1 | (uint32_t)from->had_new_time << 2;
@@ -657,33 +465,34 @@ static void put_layers_point(layers_state *w, const uint8_t *p)
         (uint32_t)(n != last_n) << 2 | (uint32_t)(memcmp(p + 18, last + 18, 2) != 0) << 3 |
         (uint32_t)new_time << 4 | (uint32_t)(memcmp(p + 20, last + 20, 2) != 0) << 5 |
         (uint32_t)(channel != w->channel) << 6;
-    put_symbol(&c[XY], &from->changed[context], 128, changed);
-    if (changed & 64) put_symbol(&c[XY], &from->channel, 3, (channel + 4 - w->channel) % 4 - 1);
+    write_laz_symbol(&c[XY], &from->changed[context], 128, changed);
+    if (changed & 64)
+        write_laz_symbol(&c[XY], &from->channel, 3, (channel + 4 - w->channel) % 4 - 1);
     put_returns(&c[XY], s, last_n, last_r, n, r, changed);
 
     uint32_t m = (uint32_t)(map_6[16 * n + r] - '0') << 1 | new_time, l = n > r ? n - r : r - n;
     uint32_t ends = (r == 1) | (uint32_t)(r >= n) << 1, dx = prep_le32(p) - prep_le32(last);
     uint32_t dy = prep_le32(p + 4) - prep_le32(last + 4), z = prep_le32(p + 8);
     if (l > 7) l = 7;
-    put_integer(&c[XY], &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
-    put_integer(&c[XY], &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)], (uint32_t)s->my[m].v[2],
-                dy);
+    write_laz_integer(&c[XY], &s->x, 32, &s->cx[n == 1], (uint32_t)s->mx[m].v[2], dx);
+    write_laz_integer(&c[XY], &s->y, 32, &s->cy[(n == 1) + even(s->x.k, 20)],
+                      (uint32_t)s->my[m].v[2], dy);
     add_median(&s->mx[m], (int32_t)dx);
     add_median(&s->my[m], (int32_t)dy);
-    put_integer(&c[Z], &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)], s->height[l],
-                z);
+    write_laz_integer(&c[Z], &s->z, 32, &s->cz[(n == 1) + even((s->x.k + s->y.k) / 2, 18)],
+                      s->height[l], z);
     s->height[l] = z;
-    put_symbol(&c[CLASS], &s->class[(last[16] & 31) * 2 + (ends == 3)], 256, p[16]);
-    put_symbol(&c[FLAGS], &s->flags[flags_of(last)], 64, flags_of(p));
-    put_integer(&c[INTENSITY], &s->i, 16, &s->ci[ends], s->intensity[ends << 1 | new_time],
-                prep_le16(p + 12));
+    write_laz_symbol(&c[CLASS], &s->class[(last[16] & 31) * 2 + (ends == 3)], 256, p[16]);
+    write_laz_symbol(&c[FLAGS], &s->flags[flags_of(last)], 64, flags_of(p));
+    write_laz_integer(&c[INTENSITY], &s->i, 16, &s->ci[ends], s->intensity[ends << 1 | new_time],
+                      prep_le16(p + 12));
     s->intensity[ends << 1 | new_time] = prep_le16(p + 12);
     if (changed & 8)
-        put_integer(&c[ANGLE], &s->a, 16, &s->ca[new_time], prep_le16(last + 18),
-                    prep_le16(p + 18));
-    put_symbol(&c[USER], &s->user[last[17] / 4], 256, p[17]);
+        write_laz_integer(&c[ANGLE], &s->a, 16, &s->ca[new_time], prep_le16(last + 18),
+                          prep_le16(p + 18));
+    write_laz_symbol(&c[USER], &s->user[last[17] / 4], 256, p[17]);
     if (changed & 32)
-        put_integer(&c[SOURCE], &s->s, 16, &s->cs, prep_le16(last + 20), prep_le16(p + 20));
+        write_laz_integer(&c[SOURCE], &s->s, 16, &s->cs, prep_le16(last + 20), prep_le16(p + 20));
     if (new_time) put_gps(&c[GPS], &s->gps, prep_le64(p + 22), false);
 
     c[Z].is_needed |= z != prep_le32(last + 8);
@@ -702,7 +511,7 @@ static void put_layers_point(layers_state *w, const uint8_t *p)
 static void put_layers_items(layers_state *w, const uint8_t *p, bool has_changed)
 {
     const parts *f = w->f;
-    coder *c = w->c;
+    write_laz_coder *c = w->c;
     uint32_t item = has_changed || w->is_4 ? w->channel : 0;
     uint8_t *last = w->ch[w->item].item_last;
     channel_state *s = &w->ch[item];
@@ -718,11 +527,12 @@ static void put_layers_items(layers_state *w, const uint8_t *p, bool has_changed
     }
     if (f->nir) {
         uint32_t low = last[f->nir] != p[f->nir], high = last[f->nir + 1] != p[f->nir + 1];
-        put_symbol(&c[NIR], &s->nir_changed, 4, low | high << 1);
-        if (low) put_symbol(&c[NIR], &s->nir[0], 256, (uint32_t)(p[f->nir] - last[f->nir]) & 255);
+        write_laz_symbol(&c[NIR], &s->nir_changed, 4, low | high << 1);
+        if (low)
+            write_laz_symbol(&c[NIR], &s->nir[0], 256, (uint32_t)(p[f->nir] - last[f->nir]) & 255);
         if (high)
-            put_symbol(&c[NIR], &s->nir[1], 256,
-                       (uint32_t)(p[f->nir + 1] - last[f->nir + 1]) & 255);
+            write_laz_symbol(&c[NIR], &s->nir[1], 256,
+                             (uint32_t)(p[f->nir + 1] - last[f->nir + 1]) & 255);
         c[NIR].is_needed |= low || high;
     }
     if (f->wave) {
@@ -731,7 +541,7 @@ static void put_layers_items(layers_state *w, const uint8_t *p, bool has_changed
     }
     for (uint32_t k = 0; k < f->extra_size; k++) {
         uint8_t a = last[f->extra + k], b = p[f->extra + k];
-        put_symbol(&c[EXTRA + k], &s->extra[k], 256, (uint32_t)(b - a) & 255);
+        write_laz_symbol(&c[EXTRA + k], &s->extra[k], 256, (uint32_t)(b - a) & 255);
         c[EXTRA + k].is_needed |= a != b;
     }
     memcpy(last + 30, p + 30, f->length - 30);
@@ -743,7 +553,8 @@ static bool has_layer(const parts *f, uint32_t k)
     return (k != RGB || f->rgb) && (k != NIR || f->nir) && (k != WAVE || f->wave);
 }
 
-static void put_layers(bytes *out, const parts *f, const uint8_t *records, size_t count, bool is_4)
+static void put_layers(write_laz_bytes *out, const parts *f, const uint8_t *records, size_t count,
+                       bool is_4)
 {
     layers_state *w = calloc(1, sizeof *w);
     if (w == NULL) abort();
@@ -754,25 +565,27 @@ static void put_layers(bytes *out, const parts *f, const uint8_t *records, size_
     w->ch[w->channel].item_is_used = true;
     memcpy(w->ch[w->channel].item_last, records, f->length);
     for (uint32_t k = 0; k < LAYERS; k++)
-        begin_coder(&w->c[k]);
+        write_laz_begin(&w->c[k]);
     for (size_t i = 1; i < count; i++) {
         uint32_t before = w->channel;
         put_layers_point(w, records + i * f->length);
         put_layers_items(w, records + i * f->length, w->channel != before);
     }
-    append(out, records, f->length);
-    append_u32(out, (uint32_t)count);
+    write_laz_append(out, records, f->length);
+    write_laz_append_u32(out, (uint32_t)count);
     w->c[XY].is_needed = true;
     for (uint32_t k = 0; k < LAYERS; k++) {
-        if (w->c[k].is_needed) end_coder(&w->c[k]);
-        if (has_layer(f, k)) append_u32(out, w->c[k].is_needed ? (uint32_t)w->c[k].out.size : 0);
+        if (w->c[k].is_needed) write_laz_end(&w->c[k]);
+        if (has_layer(f, k))
+            write_laz_append_u32(out, w->c[k].is_needed ? (uint32_t)w->c[k].out.size : 0);
     }
     for (uint32_t k = 0; k < LAYERS; k++) {
-        if (w->c[k].is_needed && has_layer(f, k)) append(out, w->c[k].out.p, w->c[k].out.size);
+        if (w->c[k].is_needed && has_layer(f, k))
+            write_laz_append(out, w->c[k].out.p, w->c[k].out.size);
         free(w->c[k].out.p);
     }
     free(w);
-    free_models();
+    write_laz_free_models();
 }
 
 /* ---- the file ---- */
@@ -781,26 +594,26 @@ typedef struct {
     uint32_t points, size;
 } entry;
 
-static void put_table(bytes *out, const entry *entries, uint32_t count, bool varies)
+static void put_table(write_laz_bytes *out, const entry *entries, uint32_t count, bool varies)
 {
-    coder c = {0};
-    integer n = {0};
-    model *context[2] = {NULL};
-    append_u32(out, 0);
-    append_u32(out, count);
-    begin_coder(&c);
+    write_laz_coder c = {0};
+    write_laz_number n = {0};
+    write_laz_model *context[2] = {NULL};
+    write_laz_append_u32(out, 0);
+    write_laz_append_u32(out, count);
+    write_laz_begin(&c);
     for (uint32_t i = 0; i < count; i++) {
         entry last = i > 0 ? entries[i - 1] : (entry){0, 0};
-        if (varies) put_integer(&c, &n, 32, &context[0], last.points, entries[i].points);
-        put_integer(&c, &n, 32, &context[1], last.size, entries[i].size);
+        if (varies) write_laz_integer(&c, &n, 32, &context[0], last.points, entries[i].points);
+        write_laz_integer(&c, &n, 32, &context[1], last.size, entries[i].size);
     }
-    end_coder(&c);
-    append(out, c.out.p, c.out.size);
+    write_laz_end(&c);
+    write_laz_append(out, c.out.p, c.out.size);
     free(c.out.p);
-    free_models();
+    write_laz_free_models();
 }
 
-static size_t put_description(bytes *out, const write_laz_options *o, const parts *f,
+static size_t put_description(write_laz_bytes *out, const write_laz_options *o, const parts *f,
                               uint8_t format, uint32_t points)
 {
     uint8_t p[54 + 34 + 5 * 6] = {0};
@@ -825,7 +638,7 @@ static size_t put_description(bytes *out, const write_laz_options *o, const part
         write_las_u16(item + 2, types[i][1]);
         write_las_u16(item + 4, types[i][0] == 9 ? 1 : o->version);
     }
-    append(out, p, 54 + 34 + 6u * n);
+    write_laz_append(out, p, 54 + 34 + 6u * n);
     return 54 + 34 + 6u * n;
 }
 
@@ -842,15 +655,15 @@ uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options 
     if (count > (las_size - begin) / length) count = (uint32_t)((las_size - begin) / length);
     uint32_t each = o.chunk_points != 0 ? o.chunk_points : count > 0 ? count : 1;
     parts f = parts_of(format, length);
-    bytes out = {0};
-    append(&out, las, begin);
+    write_laz_bytes out = {0};
+    write_laz_append(&out, las, begin);
     write_las_u32(out.p + 96, begin + (uint32_t)put_description(&out, &o, &f, format, each));
     write_las_u32(out.p + 100, prep_le32(las + 100) + 1);
     out.p[104] |= 128;
     size_t pointer = out.size;
     uint8_t word[8];
     write_las_u64(word, o.table == WRITE_LAZ_TABLE_AT_END ? UINT64_MAX : pointer);
-    if (o.compressor > 1) append(&out, word, 8);
+    if (o.compressor > 1) write_laz_append(&out, word, 8);
 
     entry *entries = calloc((size_t)count + 1, sizeof *entries);
     uint32_t chunks = 0;
@@ -868,7 +681,7 @@ uint8_t *write_laz(const uint8_t *las, size_t las_size, const write_laz_options 
     if (o.compressor > 1 && o.table != WRITE_LAZ_NO_TABLE) {
         put_table(&out, entries, chunks, o.varies);
         if (o.table == WRITE_LAZ_TABLE) memcpy(out.p + pointer, word, 8);
-        else append(&out, word, 8);
+        else write_laz_append(&out, word, 8);
     }
     free(entries);
     *size = out.size;
