@@ -63,9 +63,10 @@ static bool tell(build *b, uint64_t points)
     if (b->options->progress == NULL) return true;
     prep_progress p = {.phase = b->phase, .points = points, .points_total = b->points_total, .share = -1};
     p.scratch_bytes = b->store != NULL ? prep_store_scratch_peak(b->store) : b->result->source.spool_size;
-    /* Reading and building each take about half of the time. */
+    /* Of the time, reading takes about a quarter: measured on sites of 1 to 10 million points. */
+    double before = b->phase == PREP_PHASE_WRITE ? 0.25 : 0;
     if (b->points_total > 0 && b->phase != PREP_PHASE_MEASURE)
-        p.share = 0.5 * (double)points / (double)b->points_total + (b->phase == PREP_PHASE_WRITE ? 0.5 : 0);
+        p.share = before + (b->phase == PREP_PHASE_WRITE ? 0.75 : 0.25) * (double)points / (double)b->points_total;
     return b->options->progress(b->options->context, &p);
 }
 

@@ -105,7 +105,7 @@ static void choose_colours(prep_e57_points *p, const prep_e57_scan *desc, double
         double black = desc->rgb_low[c];
         double white = white_of(p->channel[p->rgb[c]].field, desc->rgb_high[c], rgb_max);
         if (!(black < 0)) black = 0;
-        p->rgb_tone[c] = (prep_tone){.low = black, .scale = 255 / (white - black)};
+        p->rgb_scale[c] = (prep_scale){.low = black, .scale = 255 / (white - black)};
     }
 }
 
@@ -115,7 +115,7 @@ static bool are_shown_as_they_are(const prep_e57_points *p)
     for (int c = 0; c < 3; c++) {
         const prep_e57_field *f = p->channel[p->rgb[c]].field;
         if (f->kind != PREP_E57_INTEGER || integer_type(f, 0) != MOSPT_U8) return false;
-        if (p->rgb_tone[c].low != 0 || p->rgb_tone[c].scale != 1) return false;
+        if (p->rgb_scale[c].low != 0 || p->rgb_scale[c].scale != 1) return false;
     }
     return true;
 }
@@ -198,11 +198,11 @@ static void show_intensity(prep_e57_points *p, const prep_scan *scan, uint32_t c
 static void show_colour(prep_e57_points *p, const prep_scan *scan, uint32_t count, uint8_t *rgbi)
 {
     for (int c = 0; c < 3 && scan->info.has_rgb; c++) {
-        prep_tone tone = p->rgb_tone[c];
+        prep_scale scale = p->rgb_scale[c];
         prep_e57_points_values(p, p->rgb[c], count, p->scratch, 1);
         for (uint32_t i = 0; i < count; i++) {
             if (is_flagged(p, p->rgb_invalid, i)) continue;
-            rgbi[4 * (size_t)i + (size_t)c] = prep_tone_apply(&tone, p->scratch[i]);
+            rgbi[4 * (size_t)i + (size_t)c] = prep_scale_apply(&scale, p->scratch[i]);
         }
     }
 }

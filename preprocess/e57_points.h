@@ -33,7 +33,8 @@ typedef struct {
     bool is_spherical;
     bool has_pose, has_rotation;
     double pose[12]; /* the upper rows of a matrix, row-major */
-    prep_tone rgb_tone[3], tone;
+    prep_scale rgb_scale[3];
+    prep_tone tone;
     prep_e57_plane plane[MOSPT_ATTRIBUTES_MAX];
     double *scratch; /* [PREP_E57_BLOCK], owned */
     uint8_t *keep;   /* [PREP_E57_BLOCK], owned */

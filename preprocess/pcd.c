@@ -363,7 +363,7 @@ static void show(const prep_scan *scan, pcd_state *pcd, uint32_t count, uint8_t 
     }
     if (!scan->info.has_rgb) return;
     if (pcd->packed >= 0) show_packed(pcd, count, rgbi);
-    prep_tone scale = {.scale = pcd->rgb_scale};
+    prep_scale scale = {.scale = pcd->rgb_scale};
     for (int c = 0; c < 3 && pcd->packed < 0; c++) {
         prep_column column = prep_pcd_rows_column(&pcd->rows, pcd->rgb[c], 0);
         if (column.type == MOSPT_U8) {
@@ -372,7 +372,7 @@ static void show(const prep_scan *scan, pcd_state *pcd, uint32_t count, uint8_t 
         }
         prep_column_to_f64(&column, count, values, 1);
         for (uint32_t i = 0; i < count; i++)
-            rgbi[4 * (size_t)i + (size_t)c] = prep_tone_apply(&scale, values[i]);
+            rgbi[4 * (size_t)i + (size_t)c] = prep_scale_apply(&scale, values[i]);
     }
 }
 

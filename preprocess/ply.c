@@ -283,7 +283,7 @@ static void show(const prep_scan *scan, ply_state *ply, uint32_t count, uint8_t 
         for (uint32_t i = 0; i < count; i++)
             memset(rgbi + 4 * (size_t)i, prep_tone_apply(&ply->tone, values[i]), 4);
     }
-    prep_tone scale = {.scale = ply->rgb_scale};
+    prep_scale scale = {.scale = ply->rgb_scale};
     for (int c = 0; c < 3 && scan->info.has_rgb; c++) {
         prep_column column = column_of(ply, ply->rgb[c]);
         if (column.type == MOSPT_U8) {
@@ -292,7 +292,7 @@ static void show(const prep_scan *scan, ply_state *ply, uint32_t count, uint8_t 
         }
         prep_column_to_f64(&column, count, values, 1);
         for (uint32_t i = 0; i < count; i++)
-            rgbi[4 * (size_t)i + (size_t)c] = prep_tone_apply(&scale, values[i]);
+            rgbi[4 * (size_t)i + (size_t)c] = prep_scale_apply(&scale, values[i]);
     }
 }
 

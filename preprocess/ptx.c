@@ -214,9 +214,9 @@ static void show(const ptx_state *ptx, int columns, const double *v, uint8_t *rg
 {
     memset(rgbi, 255, 4);
     if (columns >= 4 && !ptx->tone.is_flat) memset(rgbi, prep_tone_apply(&ptx->tone, v[3]), 4);
-    prep_tone scale = {.scale = ptx->rgb_scale};
+    prep_scale scale = {.scale = ptx->rgb_scale};
     for (int c = 0; c < 3 && columns == 7; c++)
-        rgbi[c] = prep_tone_apply(&scale, v[4 + c]);
+        rgbi[c] = prep_scale_apply(&scale, v[4 + c]);
 }
 
 static void store(const prep_scan *scan, const ptx_state *ptx, int columns, const double *v,

@@ -57,9 +57,9 @@ static void store(const prep_text_plan *plan, const double *values, uint64_t lin
                : 255,
            4);
     if (plan->rgb_scale > 0) {
-        prep_tone scale = {.scale = plan->rgb_scale};
+        prep_scale scale = {.scale = plan->rgb_scale};
         for (int c = 0; c < 3; c++)
-            rgbi[c] = prep_tone_apply(&scale, values[plan->rgb[c]]);
+            rgbi[c] = prep_scale_apply(&scale, values[plan->rgb[c]]);
     }
     for (uint32_t k = 0; k < plan->target_count; k++) {
         const prep_text_target *t = &plan->target[k];

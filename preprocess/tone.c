@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static int compare(const void *a, const void *b)
 {
@@ -9,24 +10,34 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Half of the points should not be darker than this share of white... */
+static const double MEDIAN_SHOWN = 0.35;
+/* ... but noise in the dark is not to be blown up without bound. */
+static const double POWER_MIN = 0.4;
+
+static prep_tone make_curve(double low, double high, double power)
+{
+    prep_tone tone = {.low = low, .scale = (PREP_TONE_STEPS - 1) / (high - low)};
+    for (int i = 0; i < PREP_TONE_STEPS; i++)
+        tone.curve[i] = (uint8_t)(255 * pow(i / (PREP_TONE_STEPS - 1.0), power) + 0.5);
+    return tone;
+}
+
 prep_tone prep_tone_make(double *values, size_t count)
 {
+    prep_tone tone = {.is_flat = true};
     size_t n = 0;
-    bool is_integer = true;
-    for (size_t i = 0; i < count; i++) {
-        if (!isfinite(values[i])) continue;
-        is_integer = is_integer && values[i] == floor(values[i]);
-        values[n++] = values[i];
+    for (size_t i = 0; i < count; i++)
+        if (isfinite(values[i])) values[n++] = values[i];
+    if (n > 0) qsort(values, n, sizeof *values, compare);
+    if (n == 0 || values[0] == values[n - 1]) {
+        memset(tone.curve, 255, sizeof tone.curve);
+        return tone;
     }
-    if (n == 0) return (prep_tone){.is_flat = true};
-    qsort(values, n, sizeof *values, compare);
-    double low = values[0], high = values[n - 1];
-    if (low == high) return (prep_tone){.is_flat = true, .low = low - 255, .scale = 1};
-    if (is_integer && low >= 0 && high > 1 && high <= 255) return (prep_tone){.scale = 1};
     size_t tail = n / 200;
-    if (values[tail] < values[n - 1 - tail]) {
-        low = values[tail];
-        high = values[n - 1 - tail];
-    }
-    return (prep_tone){.low = low, .scale = 255 / (high - low)};
+    if (!(values[tail] < values[n - 1 - tail])) tail = 0;
+    double low = values[tail], high = values[n - 1 - tail];
+    double median = (values[n / 2] - low) / (high - low), power = POWER_MIN;
+    if (median > 0) power = median < MEDIAN_SHOWN ? log(MEDIAN_SHOWN) / log(median) : 1;
+    return make_curve(low, high, power > POWER_MIN ? power : POWER_MIN);
 }

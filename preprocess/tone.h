@@ -8,13 +8,17 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum { PREP_TONE_STEPS = 1024 };
+
 typedef struct {
     bool is_flat;      /* the sample holds one value only, or none: nothing to show */
-    double low, scale; /* shown = (value - low) * scale, rounded and clamped */
+    double low, scale; /* (value - low) * scale is the place on the curve */
+    uint8_t curve[PREP_TONE_STEPS];
 } prep_tone;
 
-/* Chooses the range: integers up to 255 are shown as they are, all else is stretched between the
- * 0.5 % and the 99.5 % percentile, so that a single mirror reflection does not darken the scan.
+/* Chooses the range: it is stretched between the 0.5 % and the 99.5 % percentile, so that a single mirror reflection does
+ * not darken the scan; scanners that count to 255 seldom use all of it, so 8-bit values are stretched like all others.
+ * Where most of a scan would be dark all the same, as asphalt is beside road marks, a power lifts it.
  * values   [count], reordered; NaN and infinities are passed over */
 prep_tone prep_tone_make(double *values, size_t count);
 
@@ -23,7 +27,19 @@ enum { PREP_TONE_SAMPLES = 16384 };
 
 static inline uint8_t prep_tone_apply(const prep_tone *tone, double value)
 {
-    double shown = (value - tone->low) * tone->scale + 0.5;
+    double place = (value - tone->low) * tone->scale;
+    if (place >= PREP_TONE_STEPS - 1) return tone->curve[PREP_TONE_STEPS - 1];
+    return tone->curve[place > 0 ? (int)(place + 0.5) : 0]; /* NaN is the darkest */
+}
+
+/* Colours are shown as they are: only brought to 8 bits. */
+typedef struct {
+    double low, scale; /* shown = (value - low) * scale, rounded and clamped */
+} prep_scale;
+
+static inline uint8_t prep_scale_apply(const prep_scale *s, double value)
+{
+    double shown = (value - s->low) * s->scale + 0.5;
     return shown >= 255 ? 255 : shown > 0 ? (uint8_t)shown : 0; /* NaN is 0 */
 }
 

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#define AROUND_STEPS 16
 #define FOV_DEFAULT_RAD (60 * 3.14159265358979323846 / 180)
 #define RAD_PER_DEG (3.14159265358979323846 / 180)
 
@@ -64,7 +65,7 @@ typedef struct {
 static void look_from_above(const double low[3], const double high[3], double aspect,
                             double fov_rad, overview *out)
 {
-    enum { MARGIN_PERCENT = 4 };
+    enum { MARGIN_PERCENT = 8 };
     double size = 0;
     for (int a = 0; a < 3; a++) {
         out->middle[a] = low[a] + 0.5 * (high[a] - low[a]);
@@ -298,6 +299,14 @@ bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *d
     rend_camera camera;
     double low[3], high[3], middle[3];
     rend_camera_bounds(dataset, low, high);
+    /* A single position has no size of its own: look at some steps around it. */
+    if (low[0] == high[0] && low[1] == high[1] && low[2] == high[2]) {
+        double around = AROUND_STEPS * dataset->metadata.grid.step;
+        for (int a = 0; a < 3; a++)
+            around = fmax(around, 1e-6 * fabs(low[a]));
+        for (int a = 0; a < 3; a++)
+            low[a] -= around, high[a] += around;
+    }
     for (int a = 0; a < 3; a++)
         middle[a] = low[a] + 0.5 * (high[a] - low[a]);
     double aspect = (double)width / height;

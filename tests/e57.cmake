@@ -9,8 +9,14 @@ foreach(name test_e57 test_e57_damage)
     add_test(NAME ${name} COMMAND ${name})
 endforeach()
 
-# Without -fsanitize=fuzzer it mutates a file of its own.
-add_executable(fuzz_e57 fuzz_e57.c)
+add_executable(fuzz_e57 fuzz_e57.c fuzz_main.c)
 target_link_libraries(fuzz_e57 PRIVATE e57_fixture)
-add_test(NAME fuzz_e57 COMMAND fuzz_e57 2000)
+
+# Small files of every format to start fuzzing from.
+add_executable(fuzz_seeds fuzz_seeds.c write_laz.c write_laz_coder.c)
+target_link_libraries(fuzz_seeds PRIVATE e57_fixture)
+add_test(NAME fuzz_seeds COMMAND fuzz_seeds "${CMAKE_BINARY_DIR}/seeds")
+set_tests_properties(fuzz_seeds PROPERTIES FIXTURES_SETUP fuzz_seeds)
+add_test(NAME fuzz_e57 COMMAND fuzz_e57 "${CMAKE_BINARY_DIR}/seeds/e57" 1)
+set_tests_properties(fuzz_e57 PROPERTIES FIXTURES_REQUIRED fuzz_seeds)
 set_tests_properties(test_e57 test_e57_damage fuzz_e57 PROPERTIES TIMEOUT 300)

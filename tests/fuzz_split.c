@@ -21,9 +21,10 @@ static bool read_all(const char *path, scan_points *out, mospt_err *err)
 static bool read_alone(const char *path, scan_points *out, mospt_err *err)
 {
     cpu_set_t all, one;
-    if (sched_getaffinity(0, sizeof all, &all) != 0) abort();
+    int cpu = sched_getcpu();
+    if (cpu < 0 || sched_getaffinity(0, sizeof all, &all) != 0) abort();
     CPU_ZERO(&one);
-    CPU_SET(sched_getcpu(), &one);
+    CPU_SET((size_t)cpu, &one);
     if (sched_setaffinity(0, sizeof one, &one) != 0) abort();
     bool ok = read_all(path, out, err);
     sched_setaffinity(0, sizeof all, &all);

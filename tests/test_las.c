@@ -206,8 +206,10 @@ static void black_is_no_colour(void **state)
     assert_string_equal(scan_points_type(&p, "rgb"), "");
     for (uint32_t i = 0; i < o.count; i++) {
         for (uint32_t c = 0; c < 4; c++)
-            assert_int_equal(p.rgbi[4 * i + c], i);
+            assert_int_equal(p.rgbi[4 * i + c], p.rgbi[4 * i]);
+        assert_true(i == 0 || p.rgbi[4 * i] >= p.rgbi[4 * i - 4]);
     }
+    assert_true(p.rgbi[0] == 0 && p.rgbi[4 * 199] == 255); /* stretched */
     scan_points_fini(&p);
 }
 
