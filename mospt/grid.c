@@ -47,7 +47,7 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
     if (!isfinite(extent) || !isfinite(largest))
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), "bounds reach further than numbers do");
     if (!(step > 0)) {
-        step = extent > 0 ? ldexp(1, (int)floor(log2(extent)) - 30) : 0;
+        step = extent > 0 ? ldexp(1, ilogb(extent) - 30) : 0;
         /* A double holds 53 bits: a finer step than the last of them would only store noise. Points all at one position
          * get that step, and points all at the origin any. */
         step = fmax(step, largest > 0 ? ldexp(1, (int)ceil(log2(largest)) - 53) : 0x1p-20);

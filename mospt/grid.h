@@ -18,7 +18,7 @@ typedef struct {
 } mospt_grid;
 
 /* Makes the grid for points that lie in [low, high].
- * step     wanted step, metres; 0: a power of two, at most extent / 2^30, which leaves a bit of room to grow. A wanted step too fine for
+ * step     wanted step, metres; 0: a power of two, at most extent / 2^30. A wanted step too fine for
  *          32 bits is doubled until it fits.
  * offset   see above; NULL: zero
  * errors   MOSPT_EINVAL: bounds that are not finite, or too far from zero for 2^62 steps */

@@ -143,6 +143,7 @@ static void check_first_point(prep_scan *scan, const las_state *las, const doubl
 {
     const prep_las_header *h = &las->header;
     for (int a = 0; h->has_bounds && a < 3; a++) {
+        if (h->low[a] == h->high[a]) continue; /* as good as not filled in */
         if (xyz[a] >= h->low[a] - h->scale[a] && xyz[a] <= h->high[a] + h->scale[a]) continue;
         prep_scan_set_damage(scan, mospt_at_byte(scan->path, h->data_offset),
                              "the first point, at %.10g along %c, is outside the header's bounds: "

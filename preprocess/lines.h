@@ -23,9 +23,8 @@ void prep_lines_fini(prep_lines *lines);
 bool prep_lines_next(prep_lines *lines, const char **text, size_t *length, mospt_err *err);
 
 enum {
-    PREP_LINE_BLOCK_SIZE = 256 * 1024,
-    PREP_LINE_THREADS_SIZE =
-        1 << 20, /* bytes of text from which on threads are worth their start */
+    PREP_LINE_BLOCK_SIZE = 1 << 20,   /* smaller ones lose in changes of thread what they gain */
+    PREP_LINE_THREADS_SIZE = 2 << 20, /* of a file, from which on threads are worth their start */
 };
 
 /* Lines of a text. A line that is longer than a block comes in pieces, each a block of its own but

@@ -9,7 +9,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-enum { LEAST = 1200 * 1024, MOST = 1500 * 1024 };
+enum { LEAST = 2200 * 1024, MOST = 2500 * 1024 }; /* two blocks and more */
 
 static bool read_all(const char *path, scan_points *out, mospt_err *err)
 {

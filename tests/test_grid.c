@@ -58,7 +58,7 @@ static void positions_are_never_off_by_more_than_half_a_step(void **state)
             for (int a = 0; a < 3; a++) low[a] = places[p] + a, high[a] = low[a] + extent;
             CORE_NEED(mospt_grid_make(low, high, 0, NULL, &grid, &err));
             assert_true(mospt_grid_is_valid(&grid));
-            assert_true(grid.bits <= 30); /* two bits of room to grow */
+            assert_true(grid.bits <= 32);
             for (int i = 0; i < 300; i++) {
                 uint32_t g[3];
                 double world[3];
@@ -69,7 +69,7 @@ static void positions_are_never_off_by_more_than_half_a_step(void **state)
         }
 }
 
-static void step_of_floating_point_sites_is_below_the_extent_over_2_to_the_29(void **state)
+static void step_of_floating_point_sites_is_at_most_the_extent_over_2_to_the_30(void **state)
 {
     uint64_t random = 13;
     (void)state;
@@ -80,7 +80,7 @@ static void step_of_floating_point_sites_is_below_the_extent_over_2_to_the_29(vo
         for (int a = 0; a < 3; a++) low[a] = core_unit(&random) - 0.5, high[a] = low[a] + extent * (a == i % 3 ? 1 : core_unit(&random));
         CORE_NEED(mospt_grid_make(low, high, 0, NULL, &grid, &err));
         double widest = fmax(fmax(high[0] - low[0], high[1] - low[1]), high[2] - low[2]);
-        if (widest > 1e-6) assert_true(grid.step < ldexp(widest, -29) && grid.bits <= 31);
+        if (widest > 1e-6) assert_true(grid.step <= ldexp(widest, -30) && grid.bits <= 32);
         assert_true(frexp(grid.step, &(int){0}) == 0.5); /* a power of two: arithmetic with it is exact */
     }
 }
@@ -247,7 +247,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(las_positions_come_back_bit_for_bit),
         cmocka_unit_test(positions_are_never_off_by_more_than_half_a_step),
-        cmocka_unit_test(step_of_floating_point_sites_is_below_the_extent_over_2_to_the_29),
+        cmocka_unit_test(step_of_floating_point_sites_is_at_most_the_extent_over_2_to_the_30),
         cmocka_unit_test(grid_positions_survive_the_way_to_the_world_and_back),
         cmocka_unit_test(what_lies_outside_the_root_cube_is_refused),
         cmocka_unit_test(bounds_that_are_no_range_are_refused),

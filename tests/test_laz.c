@@ -112,6 +112,9 @@ static image make_las(uint8_t format, uint32_t count, uint32_t extra_size, uint6
                            .rgb_step = 1,
                            .intensity_step = 1};
     las.bytes = write_las(&o, &las.size);
+    const double far[2] = {1e12, -1e12}; /* bounds that all points are inside of */
+    for (int a = 0; a < 3; a++)
+        memcpy(las.bytes + 179 + 16 * a, far, sizeof far);
     uint32_t begin = prep_le32(las.bytes + 96);
     maker m = {.seed = seed, .format = format, .length = prep_le16(las.bytes + 105)};
     for (int i = 0; i < 6; i++)
