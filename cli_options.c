@@ -7,24 +7,36 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { B = 1 << CLI_BUILD, V = 1 << CLI_VIEW, S = 1 << CLI_SHOT, I = 1 << CLI_INFO, C = 1 << CLI_CHECK };
+enum {
+    B = 1 << CLI_BUILD,
+    V = 1 << CLI_VIEW,
+    S = 1 << CLI_SHOT,
+    I = 1 << CLI_INFO,
+    C = 1 << CLI_CHECK
+};
 
 typedef bool (*reader)(cli_options *o, const char *value);
 
 static const struct {
     const char *name, *arguments, *purpose, *details;
 } commands[CLI_COMMANDS] = {
-    [CLI_BUILD] = {"build", "SCANS... -o NAME.ipts", "make a dataset of files and folders of scans",
-                   "Reads LAS, LAZ, E57, PTX, PTS, PCD, PLY and text (.xyz .txt .asc .csv); folders are searched recursively. No\n"
-                   "point is ever lost: what is dropped is counted by reason, what is left out is named.\n"},
+    [CLI_BUILD] =
+        {"build", "SCANS... -o NAME.ipts", "make a dataset of files and folders of scans",
+         "Reads LAS, LAZ, E57, PTX, PTS, PCD, PLY and text (.xyz .txt .asc .csv); folders are "
+         "searched recursively. No\n"
+         "point is ever lost: what is dropped is counted by reason, what is left out is named.\n"},
     [CLI_VIEW] = {"view", "NAME.ipts | SCANS...", "look at a dataset, or at raw scans, in a window",
-                  "Raw scans are built first, into a temporary dataset or the one that -o names. In the window, F1 shows the keys.\n"},
+                  "Raw scans are built first, into a temporary dataset or the one that -o names. "
+                  "In the window, F1 shows the keys.\n"},
     [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",
-                  "Without --eye and --target the picture shows all of the site. The same dataset and options give the same bytes.\n"},
-    [CLI_INFO] = {"info", "NAME.ipts | SCAN", "say what is in a dataset, or in a scan file",
-                  "Of a scan file: its format, what it holds, and what looks wrong; nothing is built.\n"},
+                  "Without --eye and --target the picture shows all of the site. The same dataset "
+                  "and options give the same bytes.\n"},
+    [CLI_INFO] =
+        {"info", "NAME.ipts | SCAN", "say what is in a dataset, or in a scan file",
+         "Of a scan file: its format, what it holds, and what looks wrong; nothing is built.\n"},
     [CLI_CHECK] = {"check", "NAME.ipts", "prove that nothing in a dataset is lost or damaged",
-                   "Reads every byte: checksums, the place of every point, every promise of the structure.\n"},
+                   "Reads every byte: checksums, the place of every point, every promise of the "
+                   "structure.\n"},
 };
 
 static bool read_count(const char *text, uint64_t low, uint64_t high, uint64_t *out)
@@ -77,38 +89,106 @@ static bool read_real(const char *text, double low, double high, double *out)
 static bool read_triple(const char *text, double out[3])
 {
     int used = 0;
-    if (sscanf(text, "%lf,%lf,%lf%n", &out[0], &out[1], &out[2], &used) != 3 || text[used] != '\0') return false;
+    if (sscanf(text, "%lf,%lf,%lf%n", &out[0], &out[1], &out[2], &used) != 3 || text[used] != '\0')
+        return false;
     return isfinite(out[0]) && isfinite(out[1]) && isfinite(out[2]);
 }
 
-static bool o_output(cli_options *o, const char *v) { return (o->output = v)[0] != '\0'; }
-static bool o_temp_dir(cli_options *o, const char *v) { return (o->temp_dir = v)[0] != '\0'; }
-static bool o_columns(cli_options *o, const char *v) { return (o->columns = v)[0] != '\0'; }
-static bool o_poses(cli_options *o, const char *v) { return (o->poses = v)[0] != '\0'; }
-static bool o_crs(cli_options *o, const char *v) { return (o->crs = v)[0] != '\0'; }
-static bool o_screenshot(cli_options *o, const char *v) { return (o->screenshot = v)[0] != '\0'; }
-static bool o_json(cli_options *o, const char *v) { return (void)v, o->json = true; }
-static bool o_stats(cli_options *o, const char *v) { return (void)v, o->stats = true; }
-static bool o_force(cli_options *o, const char *v) { return (void)v, o->force = true; }
-static bool o_each(cli_options *o, const char *v) { return (void)v, o->each = true; }
-static bool o_quiet(cli_options *o, const char *v) { return (void)v, o->quiet = true; }
-static bool o_help(cli_options *o, const char *v) { return (void)v, o->help = true; }
-static bool o_no_edl(cli_options *o, const char *v) { return (void)v, o->look.no_edl = true; }
-static bool o_threads(cli_options *o, const char *v) { return read_u32(v, 1, 1024, &o->threads); }
-static bool o_frames(cli_options *o, const char *v) { return read_u32(v, 1, UINT32_MAX, &o->frames); }
-static bool o_memory(cli_options *o, const char *v) { return read_amount(v, 1024, &o->memory); }
-static bool o_depth(cli_options *o, const char *v) { return read_u32(v, 1, 9, &o->inner_depth); }
-static bool o_ram(cli_options *o, const char *v) { return read_amount(v, 1024, &o->limits.ram_cache_bytes); }
-static bool o_gpu(cli_options *o, const char *v) { return read_amount(v, 1024, &o->limits.gpu_cache_bytes); }
-static bool o_eye(cli_options *o, const char *v) { return o->camera.has_eye = read_triple(v, o->camera.eye); }
-static bool o_target(cli_options *o, const char *v) { return o->camera.has_target = read_triple(v, o->camera.target); }
-static bool o_fov(cli_options *o, const char *v) { return o->camera.has_fov = read_real(v, 1, 170, &o->camera.fov_deg); }
+static bool o_output(cli_options *o, const char *v)
+{
+    return (o->output = v)[0] != '\0';
+}
+static bool o_temp_dir(cli_options *o, const char *v)
+{
+    return (o->temp_dir = v)[0] != '\0';
+}
+static bool o_columns(cli_options *o, const char *v)
+{
+    return (o->columns = v)[0] != '\0';
+}
+static bool o_poses(cli_options *o, const char *v)
+{
+    return (o->poses = v)[0] != '\0';
+}
+static bool o_crs(cli_options *o, const char *v)
+{
+    return (o->crs = v)[0] != '\0';
+}
+static bool o_screenshot(cli_options *o, const char *v)
+{
+    return (o->screenshot = v)[0] != '\0';
+}
+static bool o_json(cli_options *o, const char *v)
+{
+    return (void)v, o->json = true;
+}
+static bool o_stats(cli_options *o, const char *v)
+{
+    return (void)v, o->stats = true;
+}
+static bool o_force(cli_options *o, const char *v)
+{
+    return (void)v, o->force = true;
+}
+static bool o_each(cli_options *o, const char *v)
+{
+    return (void)v, o->each = true;
+}
+static bool o_quiet(cli_options *o, const char *v)
+{
+    return (void)v, o->quiet = true;
+}
+static bool o_help(cli_options *o, const char *v)
+{
+    return (void)v, o->help = true;
+}
+static bool o_no_edl(cli_options *o, const char *v)
+{
+    return (void)v, o->look.no_edl = true;
+}
+static bool o_threads(cli_options *o, const char *v)
+{
+    return read_u32(v, 1, 1024, &o->threads);
+}
+static bool o_frames(cli_options *o, const char *v)
+{
+    return read_u32(v, 1, UINT32_MAX, &o->frames);
+}
+static bool o_memory(cli_options *o, const char *v)
+{
+    return read_amount(v, 1024, &o->memory);
+}
+static bool o_depth(cli_options *o, const char *v)
+{
+    return read_u32(v, 1, 9, &o->inner_depth);
+}
+static bool o_ram(cli_options *o, const char *v)
+{
+    return read_amount(v, 1024, &o->limits.ram_cache_bytes);
+}
+static bool o_gpu(cli_options *o, const char *v)
+{
+    return read_amount(v, 1024, &o->limits.gpu_cache_bytes);
+}
+static bool o_eye(cli_options *o, const char *v)
+{
+    return o->camera.has_eye = read_triple(v, o->camera.eye);
+}
+static bool o_target(cli_options *o, const char *v)
+{
+    return o->camera.has_target = read_triple(v, o->camera.target);
+}
+static bool o_fov(cli_options *o, const char *v)
+{
+    return o->camera.has_fov = read_real(v, 1, 170, &o->camera.fov_deg);
+}
 
 static bool o_crop(cli_options *o, const char *v)
 {
     double *c = o->crop;
     int used = 0;
-    o->has_crop = sscanf(v, "%lf,%lf,%lf,%lf,%lf,%lf%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5], &used) == 6 &&
+    o->has_crop = sscanf(v, "%lf,%lf,%lf,%lf,%lf,%lf%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5],
+                         &used) == 6 &&
                   v[used] == '\0' && c[0] <= c[3] && c[1] <= c[4] && c[2] <= c[5];
     return o->has_crop;
 }
@@ -151,17 +231,21 @@ static bool o_up(cli_options *o, const char *v)
 {
     o->camera.has_up = true;
     if (strlen(v) == 1 && strchr("xyz", v[0]) != NULL) {
-        for (int a = 0; a < 3; a++) o->camera.up[a] = v[0] == "xyz"[a];
+        for (int a = 0; a < 3; a++)
+            o->camera.up[a] = v[0] == "xyz"[a];
         return true;
     }
-    return read_triple(v, o->camera.up) && fabs(o->camera.up[0]) + fabs(o->camera.up[1]) + fabs(o->camera.up[2]) > 0;
+    return read_triple(v, o->camera.up) &&
+           fabs(o->camera.up[0]) + fabs(o->camera.up[1]) + fabs(o->camera.up[2]) > 0;
 }
 
 static bool o_size(cli_options *o, const char *v)
 {
     int used = 0;
-    if (sscanf(v, "%u%*1[xX]%u%n", &o->width, &o->height, &used) != 2 || v[used] != '\0') return false;
-    return o->width >= 1 && o->width <= REND_SIZE_MAX && o->height >= 1 && o->height <= REND_SIZE_MAX;
+    if (sscanf(v, "%u%*1[xX]%u%n", &o->width, &o->height, &used) != 2 || v[used] != '\0')
+        return false;
+    return o->width >= 1 && o->width <= REND_SIZE_MAX && o->height >= 1 &&
+           o->height <= REND_SIZE_MAX;
 }
 
 static bool o_colour(cli_options *o, const char *v)
@@ -183,19 +267,32 @@ static const struct {
     const char *help;
 } options[] = {
     {"output", "PATH", 'o', B | V | S, o_output, "where the dataset or the picture goes"},
-    {"each", NULL, 0, B, o_each, "one dataset per scan file, in the folder -o; only what has changed is built"},
+    {"each", NULL, 0, B, o_each,
+     "one dataset per scan file, in the folder -o; only what has changed is built"},
     {"force", NULL, 0, B | V, o_force, "replace a dataset that is there"},
-    {"threads", "N", 0, B | V | S, o_threads, "threads of the builder (default: one per processor)"},
-    {"memory", "SIZE", 0, B | V | S, o_memory, "most memory the build takes, 64M or more (default: a quarter of the machine)"},
-    {"temp-dir", "FOLDER", 0, B | V | S, o_temp_dir, "where scratch files go (default: beside the output)"},
-    {"inner-depth", "N", 0, B | V | S, o_depth, "levels of the octree inside each node, 1 to 9 (default: 7)"},
-    {"columns", "NAMES", 0, B | V | S, o_columns, "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
-    {"poses", "FILE", 0, B | V | S | I, o_poses, "moves scans: lines of a file name and a 4 x 4 matrix (NAME.pose.txt beside a scan does it too)"},
-    {"crop", "BOX", 0, B | V | S | I, o_crop, "keep what is inside X0,Y0,Z0,X1,Y1,Z1; the rest is counted"},
-    {"crs", "TEXT", 0, B | V, o_crs, "coordinate reference system to note (default: what the scans say)"},
-    {"budget", "POINTS", 0, V | S, o_budget, "most points drawn in a frame, as in 2M, or all (default: 3M in a window, all in a shot)"},
-    {"min-node-size", "PX", 0, V | S, o_min_node_size, "nodes that are smaller on the screen are not drawn (default: by detail)"},
-    {"point-size", "SIZE", 0, V | S, o_point_size, "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
+    {"threads", "N", 0, B | V | S, o_threads,
+     "threads of the builder (default: one per processor)"},
+    {"memory", "SIZE", 0, B | V | S, o_memory,
+     "most memory the build takes, 64M or more (default: a quarter of the machine)"},
+    {"temp-dir", "FOLDER", 0, B | V | S, o_temp_dir,
+     "where scratch files go (default: beside the output)"},
+    {"inner-depth", "N", 0, B | V | S, o_depth,
+     "levels of the octree inside each node, 1 to 9 (default: 7)"},
+    {"columns", "NAMES", 0, B | V | S, o_columns,
+     "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
+    {"poses", "FILE", 0, B | V | S | I, o_poses,
+     "moves scans: lines of a file name and a 4 x 4 matrix (NAME.pose.txt beside a scan does it "
+     "too)"},
+    {"crop", "BOX", 0, B | V | S | I, o_crop,
+     "keep what is inside X0,Y0,Z0,X1,Y1,Z1; the rest is counted"},
+    {"crs", "TEXT", 0, B | V, o_crs,
+     "coordinate reference system to note (default: what the scans say)"},
+    {"budget", "POINTS", 0, V | S, o_budget,
+     "most points drawn in a frame, as in 2M, or all (default: 3M in a window, all in a shot)"},
+    {"min-node-size", "PX", 0, V | S, o_min_node_size,
+     "nodes that are smaller on the screen are not drawn (default: by detail)"},
+    {"point-size", "SIZE", 0, V | S, o_point_size,
+     "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
     {"color", "BY", 0, V | S, o_colour, "rgb, intensity or elevation (default: rgb)"},
     {"colour", "BY", 0, V | S, o_colour, NULL},
     {"no-edl", NULL, 0, V | S, o_no_edl, "without eye-dome lighting"},
@@ -256,13 +353,16 @@ bool cli_options_read(cli_command command, int argc, char **argv, cli_options *o
         int at = optind, found = getopt_long(argc, argv, letters, list, NULL);
         if (found == -1) break;
         if (found == ':') return misuse(err, "%s wants a value%s", argv[optind - 1], "");
-        if (found == '?') return misuse(err, "%s is no option of `instantpoints %s`", argv[at], commands[command].name);
+        if (found == '?')
+            return misuse(err, "%s is no option of `instantpoints %s`", argv[at],
+                          commands[command].name);
         for (int i = 0; i < OPTION_COUNT; i++) {
             if (found != 256 + i && (found != options[i].letter || found == 0)) continue;
             const char *value = options[i].value != NULL ? optarg : "";
             if (!options[i].read(&o, value)) {
                 char name[64];
-                snprintf(name, sizeof name, "--%s %s", options[i].name, options[i].value != NULL ? options[i].value : "");
+                snprintf(name, sizeof name, "--%s %s", options[i].name,
+                         options[i].value != NULL ? options[i].value : "");
                 return misuse(err, "\"%s\" does not fit %s", value, name);
             }
             break;
@@ -280,11 +380,15 @@ char *cli_help(void)
     size_t size;
     FILE *f = open_memstream(&text, &size);
     if (f == NULL) return NULL;
-    fprintf(f, "Instant Points %s: any amount of raw laser-scan points, at once\n\n"
-               "usage: instantpoints COMMAND ...\n\n", IPTS_VERSION);
+    fprintf(f,
+            "Instant Points %s: any amount of raw laser-scan points, at once\n\n"
+            "usage: instantpoints COMMAND ...\n\n",
+            IPTS_VERSION);
     for (int c = 0; c < CLI_COMMANDS; c++)
-        fprintf(f, "  %-6s %-26s %s\n", commands[c].name, commands[c].arguments, commands[c].purpose);
-    fprintf(f, "\n`instantpoints help COMMAND` has the options. Exit codes: 0 done, 1 failed, 2 wrong use,\n"
+        fprintf(f, "  %-6s %-26s %s\n", commands[c].name, commands[c].arguments,
+                commands[c].purpose);
+    fprintf(f, "\n`instantpoints help COMMAND` has the options. Exit codes: 0 done, 1 failed, 2 "
+               "wrong use,\n"
                "3 done, but some input was left out (it is named).\n");
     fclose(f);
     return text;
@@ -296,14 +400,17 @@ char *cli_command_help(cli_command command)
     size_t size;
     FILE *f = open_memstream(&text, &size);
     if (f == NULL) return NULL;
-    fprintf(f, "usage: instantpoints %s %s\n\n%c%s.\n%s\n", commands[command].name, commands[command].arguments,
-            toupper((unsigned char)commands[command].purpose[0]), commands[command].purpose + 1, commands[command].details);
+    fprintf(f, "usage: instantpoints %s %s\n\n%c%s.\n%s\n", commands[command].name,
+            commands[command].arguments, toupper((unsigned char)commands[command].purpose[0]),
+            commands[command].purpose + 1, commands[command].details);
     for (int i = 0; i < OPTION_COUNT; i++) {
         char left[64];
         if (!(options[i].commands >> command & 1) || options[i].help == NULL) continue;
         snprintf(left, sizeof left, "%c%c%s --%s%s%s", options[i].letter != 0 ? '-' : ' ',
-                 options[i].letter != 0 ? options[i].letter : ' ', options[i].letter != 0 ? "," : " ", options[i].name,
-                 options[i].value != NULL ? " " : "", options[i].value != NULL ? options[i].value : "");
+                 options[i].letter != 0 ? options[i].letter : ' ',
+                 options[i].letter != 0 ? "," : " ", options[i].name,
+                 options[i].value != NULL ? " " : "",
+                 options[i].value != NULL ? options[i].value : "");
         fprintf(f, "  %-26s %s\n", left, options[i].help);
     }
     fclose(f);

@@ -1,4 +1,5 @@
-/* cli_options.h - the command line: subcommands, their options, and the pages of help, all from one table. */
+/* cli_options.h - the command line: subcommands, their options, and the pages of help, all from one
+ * table. */
 #pragma once
 #include "mospt/err.h"
 #include "render/options.h"

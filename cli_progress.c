@@ -17,7 +17,8 @@ double cli_clock(void)
 
 void cli_progress_start(cli_progress *p, bool quiet)
 {
-    *p = (cli_progress){.quiet = quiet, .terminal = isatty(STDERR_FILENO) == 1, .phase = PREP_PHASES};
+    *p = (cli_progress){
+        .quiet = quiet, .terminal = isatty(STDERR_FILENO) == 1, .phase = PREP_PHASES};
     p->start = p->last = cli_clock();
 }
 
@@ -47,7 +48,8 @@ static void show(cli_progress *p, const char *line)
         fprintf(stderr, "%s\n", line);
         return;
     }
-    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 0) columns = window.ws_col;
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 0)
+        columns = window.ws_col;
     fprintf(stderr, "\r\033[K%.*s", columns - 1, line);
     fflush(stderr);
     p->shown = true;
@@ -70,13 +72,16 @@ void cli_progress_build(cli_progress *p, const prep_progress *now)
         p->phase_first = now->points;
     }
     if (!is_due(p)) return;
-    double rate = t > p->phase_start ? (double)(now->points - p->phase_first) / (t - p->phase_start) : 0;
+    double rate =
+        t > p->phase_start ? (double)(now->points - p->phase_first) / (t - p->phase_start) : 0;
     if (now->points_total > 0) snprintf(of, sizeof of, " of %.1f", (double)now->points_total / 1e6);
     if (now->share >= 0) snprintf(share, sizeof share, " %3.0f %%", 100 * now->share);
     if (now->share > 0.02) time_left((t - p->start) * (1 - now->share) / now->share, left);
-    if (now->scratch_bytes > 0) snprintf(scratch, sizeof scratch, "scratch %.0f MB   ", (double)now->scratch_bytes / 1e6);
-    snprintf(line, sizeof line, "%-9s%s   %.1f%s M points   %.1f M/s   memory %.0f MiB   %s%s", prep_phase_name(now->phase),
-             share, (double)now->points / 1e6, of, rate / 1e6, resident_mib(), scratch, left);
+    if (now->scratch_bytes > 0)
+        snprintf(scratch, sizeof scratch, "scratch %.0f MB   ", (double)now->scratch_bytes / 1e6);
+    snprintf(line, sizeof line, "%-9s%s   %.1f%s M points   %.1f M/s   memory %.0f MiB   %s%s",
+             prep_phase_name(now->phase), share, (double)now->points / 1e6, of, rate / 1e6,
+             resident_mib(), scratch, left);
     show(p, line);
 }
 

@@ -1,12 +1,13 @@
 /* cli_progress.h - the progress line of a long job, on standard error.
  *
- * On a terminal one line is rewritten ten times a second; elsewhere (a log file) a line is added every ten seconds. */
+ * On a terminal one line is rewritten ten times a second; elsewhere (a log file) a line is added
+ * every ten seconds. */
 #pragma once
 #include "preprocess/build.h"
 
 typedef struct {
     bool quiet, terminal;
-    double start, last;         /* seconds, of the job and of the line */
+    double start, last; /* seconds, of the job and of the line */
     prep_phase phase;
     double phase_start;
     uint64_t phase_first;

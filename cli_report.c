@@ -21,8 +21,9 @@ void cli_report_losses(const prep_build_result *r)
         fprintf(stderr, "instantpoints: damaged, read in part: %s\n", text);
     }
     if (r->files.unknown_count == 0) return;
-    fprintf(stderr, "instantpoints: %zu file%s in the folders %s no scan that this program knows:", r->files.unknown_count,
-            r->files.unknown_count == 1 ? "" : "s", r->files.unknown_count == 1 ? "is" : "are");
+    fprintf(stderr, "instantpoints: %zu file%s in the folders %s no scan that this program knows:",
+            r->files.unknown_count, r->files.unknown_count == 1 ? "" : "s",
+            r->files.unknown_count == 1 ? "is" : "are");
     for (size_t i = 0; i < r->files.unknown_count && i < UNKNOWN_SHOWN; i++)
         fprintf(stderr, "%s %s", i > 0 ? "," : "", r->files.unknown[i].name);
     fprintf(stderr, "%s\n", r->files.unknown_count > UNKNOWN_SHOWN ? ", ..." : "");
@@ -41,7 +42,8 @@ void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t o
 static uint64_t points_dropped(const mospt_metadata *m)
 {
     uint64_t sum = 0;
-    for (uint32_t i = 0; i < m->source_count; i++) sum += m->sources[i].dropped;
+    for (uint32_t i = 0; i < m->source_count; i++)
+        sum += m->sources[i].dropped;
     return sum;
 }
 
@@ -70,15 +72,18 @@ void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
     char a[32], b[32];
     uint64_t dropped = points_dropped(m);
     fprintf(out, "%s\n", output);
-    fprintf(out, "  points     %s read, %s kept", cli_grouped(m->point_count + dropped, a), cli_grouped(m->point_count, b));
+    fprintf(out, "  points     %s read, %s kept", cli_grouped(m->point_count + dropped, a),
+            cli_grouped(m->point_count, b));
     if (dropped > 0) print_reasons(out, m);
-    fprintf(out, "\n  scans      %" PRIu32 "%s\n", m->source_count, prep_build_left_something_out(r) ? ", and some input left out (see above)" : "");
+    fprintf(out, "\n  scans      %" PRIu32 "%s\n", m->source_count,
+            prep_build_left_something_out(r) ? ", and some input left out (see above)" : "");
     cli_bytes_text(r->payload_bytes, a);
-    fprintf(out, "  tree       %" PRIu32 " nodes in %" PRIu32 " levels, %s (%.1f bytes a point)\n", r->node_count,
-            r->level_count, a, (double)r->payload_bytes / (double)m->point_count);
+    fprintf(out, "  tree       %" PRIu32 " nodes in %" PRIu32 " levels, %s (%.1f bytes a point)\n",
+            r->node_count, r->level_count, a, (double)r->payload_bytes / (double)m->point_count);
     fprintf(out, "  position   largest error %.3g, step %.3g\n", m->position_error, m->grid.step);
     cli_bytes_text(r->scratch_bytes, b);
-    fprintf(out, "  memory     %.0f MiB at the peak, scratch space %s\n", (double)r->peak_memory / (1 << 20), b);
+    fprintf(out, "  memory     %.0f MiB at the peak, scratch space %s\n",
+            (double)r->peak_memory / (1 << 20), b);
     fprintf(out, "  time       %.2f s (", r->total_seconds);
     for (int p = 0; p < PREP_PHASES; p++)
         fprintf(out, "%s%s %.2f", p > 0 ? ", " : "", prep_phase_name((prep_phase)p), r->seconds[p]);
@@ -99,17 +104,22 @@ static json_t *sources_json(const mospt_metadata *m)
         const mospt_source *s = &m->sources[i];
         json_t *reasons = json_object();
         for (uint32_t r = 0; r < s->reason_count; r++)
-            json_object_set_new(reasons, s->drop_reason[r], json_integer((json_int_t)s->drop_count[r]));
-        json_t *json = json_pack("{s:o, s:o, s:o, s:I, s:I, s:o, s:b, s:b}", "name", cli_text_json(s->name), "scan",
-                                 cli_text_json(s->scan), "format", cli_text_json(s->format), "points", (json_int_t)s->points,
-                                 "dropped", (json_int_t)s->dropped, "dropped_by_reason", reasons, "rgb", (int)s->has_rgb,
-                                 "intensity", (int)s->has_intensity);
+            json_object_set_new(reasons, s->drop_reason[r],
+                                json_integer((json_int_t)s->drop_count[r]));
+        json_t *json =
+            json_pack("{s:o, s:o, s:o, s:I, s:I, s:o, s:b, s:b}", "name", cli_text_json(s->name),
+                      "scan", cli_text_json(s->scan), "format", cli_text_json(s->format), "points",
+                      (json_int_t)s->points, "dropped", (json_int_t)s->dropped, "dropped_by_reason",
+                      reasons, "rgb", (int)s->has_rgb, "intensity", (int)s->has_intensity);
         if (s->points > 0)
-            json_object_set_new(json, "bounds", json_pack("{s:o, s:o}", "min", cli_triple_json(s->low), "max", cli_triple_json(s->high)));
+            json_object_set_new(json, "bounds",
+                                json_pack("{s:o, s:o}", "min", cli_triple_json(s->low), "max",
+                                          cli_triple_json(s->high)));
         if (s->damage != NULL) json_object_set_new(json, "damage", cli_text_json(s->damage));
         if (s->has_pose) {
             json_t *pose = json_array();
-            for (int k = 0; k < 16; k++) json_array_append_new(pose, json_real(s->pose[k]));
+            for (int k = 0; k < 16; k++)
+                json_array_append_new(pose, json_real(s->pose[k]));
             json_object_set_new(json, "pose", pose);
         }
         json_array_append_new(array, json);
@@ -127,19 +137,23 @@ void cli_report_build_json(FILE *out, const char *output, const prep_build_resul
     const mospt_metadata *m = &r->metadata;
     json_t *left_out = json_array(), *unknown = json_array(), *seconds = json_object();
     for (uint32_t i = 0; i < r->source.left_out_count; i++)
-        json_array_append_new(left_out, err_json(r->source.left_out[i].name, &r->source.left_out[i].err));
+        json_array_append_new(left_out,
+                              err_json(r->source.left_out[i].name, &r->source.left_out[i].err));
     for (size_t i = 0; i < r->files.unknown_count; i++)
         json_array_append_new(unknown, cli_text_json(r->files.unknown[i].name));
     for (int p = 0; p < PREP_PHASES; p++)
         json_object_set_new(seconds, prep_phase_name((prep_phase)p), json_real(r->seconds[p]));
     json_object_set_new(seconds, "total", json_real(r->total_seconds));
-    cli_write_json(out, json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}", "output",
-                              cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
-                              (json_int_t)points_dropped(m), "bounds", bounds_json(m), "sources", sources_json(m),
-                              "left_out", left_out, "unknown", unknown, "nodes", (json_int_t)r->node_count, "levels",
-                              (json_int_t)r->level_count, "bytes", (json_int_t)r->payload_bytes, "position_error",
-                              m->position_error, "step", m->grid.step, "peak_memory", (json_int_t)r->peak_memory,
-                              "scratch_bytes", (json_int_t)r->scratch_bytes, "seconds", seconds));
+    cli_write_json(
+        out,
+        json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
+                  "output", cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
+                  (json_int_t)points_dropped(m), "bounds", bounds_json(m), "sources",
+                  sources_json(m), "left_out", left_out, "unknown", unknown, "nodes",
+                  (json_int_t)r->node_count, "levels", (json_int_t)r->level_count, "bytes",
+                  (json_int_t)r->payload_bytes, "position_error", m->position_error, "step",
+                  m->grid.step, "peak_memory", (json_int_t)r->peak_memory, "scratch_bytes",
+                  (json_int_t)r->scratch_bytes, "seconds", seconds));
 }
 
 static void print_sources(FILE *out, const mospt_metadata *m)
@@ -148,11 +162,13 @@ static void print_sources(FILE *out, const mospt_metadata *m)
     fprintf(out, "  scans      %" PRIu32 "\n", m->source_count);
     for (uint32_t i = 0; i < m->source_count; i++) {
         const mospt_source *s = &m->sources[i];
-        fprintf(out, "    %15s  %s%s%s  (%s%s%s)\n", cli_grouped(s->points, number), s->name, s->scan[0] != '\0' ? " / " : "",
-                s->scan, s->format, s->has_rgb ? ", colour" : "", s->has_intensity ? ", intensity" : "");
+        fprintf(out, "    %15s  %s%s%s  (%s%s%s)\n", cli_grouped(s->points, number), s->name,
+                s->scan[0] != '\0' ? " / " : "", s->scan, s->format, s->has_rgb ? ", colour" : "",
+                s->has_intensity ? ", intensity" : "");
         if (s->damage != NULL) fprintf(out, "    %15s  damaged: %s\n", "", s->damage);
         for (uint32_t r = 0; r < s->reason_count; r++)
-            fprintf(out, "    %15s  dropped: %s\n", cli_grouped(s->drop_count[r], number), s->drop_reason[r]);
+            fprintf(out, "    %15s  dropped: %s\n", cli_grouped(s->drop_count[r], number),
+                    s->drop_reason[r]);
     }
 }
 
@@ -160,13 +176,15 @@ static void print_points(FILE *out, const mospt_metadata *m, const mospt_point_f
 {
     fprintf(out, "  mean       ");
     cli_print_triple(out, f->mean);
-    if (f->has_rgb) fprintf(out, "\n  mean rgb   %.2f  %.2f  %.2f", f->mean_rgb[0], f->mean_rgb[1], f->mean_rgb[2]);
+    if (f->has_rgb)
+        fprintf(out, "\n  mean rgb   %.2f  %.2f  %.2f", f->mean_rgb[0], f->mean_rgb[1],
+                f->mean_rgb[2]);
     fprintf(out, "\n  attribute                      min          max         mean\n");
     for (uint32_t k = 0; k < m->schema.count; k++) {
         const mospt_attribute *a = &m->schema.at[k];
         for (uint32_t c = 0; c < a->components && c < 3; c++)
-            fprintf(out, "    %-18s %12.6g %12.6g %12.6g\n", c == 0 ? a->name : "", f->attribute_min[k][c],
-                    f->attribute_max[k][c], f->attribute_mean[k][c]);
+            fprintf(out, "    %-18s %12.6g %12.6g %12.6g\n", c == 0 ? a->name : "",
+                    f->attribute_min[k][c], f->attribute_max[k][c], f->attribute_mean[k][c]);
     }
 }
 
@@ -180,9 +198,10 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
     fprintf(out, "\n  max        ");
     cli_print_triple(out, m->high);
     fprintf(out, "\n  size      ");
-    for (int k = 0; k < 3; k++) fprintf(out, " %.3f%s", m->high[k] - m->low[k], k < 2 ? " " : "\n");
-    fprintf(out, "  grid       step %.6g, root cube %.6g wide, largest position error %.3g\n", m->grid.step,
-            m->grid.step * (double)(UINT64_C(1) << m->grid.bits), m->position_error);
+    for (int k = 0; k < 3; k++)
+        fprintf(out, " %.3f%s", m->high[k] - m->low[k], k < 2 ? " " : "\n");
+    fprintf(out, "  grid       step %.6g, root cube %.6g wide, largest position error %.3g\n",
+            m->grid.step, m->grid.step * (double)(UINT64_C(1) << m->grid.bits), m->position_error);
     if (m->crs[0] != '\0') fprintf(out, "  crs        %s\n", m->crs);
     fprintf(out, "  attributes");
     for (uint32_t k = 0; k < m->schema.count; k++) {
@@ -192,20 +211,25 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
     }
     fprintf(out, "\n");
     print_sources(out, m);
-    fprintf(out, "  tree       %" PRIu32 " nodes (%" PRIu32 " leaves) in %" PRIu32 " levels, inner depth %" PRIu32
-                 ", branching factor %.2f outside and %.2f inside\n",
-            tree->nodes, tree->leaves, tree->levels, m->inner_depth, tree->branching, tree->cell_branching);
-    fprintf(out, "  MOSPT      %" PRIu32 " to %" PRIu32 " points, median %" PRIu32 ", mean %.0f\n", tree->points_min,
-            tree->points_max, tree->points_median, tree->points_mean);
+    fprintf(out,
+            "  tree       %" PRIu32 " nodes (%" PRIu32 " leaves) in %" PRIu32
+            " levels, inner depth %" PRIu32 ", branching factor %.2f outside and %.2f inside\n",
+            tree->nodes, tree->leaves, tree->levels, m->inner_depth, tree->branching,
+            tree->cell_branching);
+    fprintf(out, "  MOSPT      %" PRIu32 " to %" PRIu32 " points, median %" PRIu32 ", mean %.0f\n",
+            tree->points_min, tree->points_max, tree->points_median, tree->points_mean);
     if (spt == NULL) {
-        fprintf(out, "  (--stats reads every point: means, and the memory of a classic sequential point tree)\n");
+        fprintf(out, "  (--stats reads every point: means, and the memory of a classic sequential "
+                     "point tree)\n");
         return;
     }
     cli_bytes_text(spt->classic_bytes, a);
     cli_bytes_text(spt->mospt_bytes, b);
     fprintf(out, "  memory     %s here; a classic sequential point tree of these points has ", b);
-    fprintf(out, "%s interior nodes\n             (branching factor %.2f) and takes ", cli_grouped(spt->interior, b), spt->branching);
-    fprintf(out, "%s: %.0f %% more\n", a, 100 * ((double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
+    fprintf(out, "%s interior nodes\n             (branching factor %.2f) and takes ",
+            cli_grouped(spt->interior, b), spt->branching);
+    fprintf(out, "%s: %.0f %% more\n", a,
+            100 * ((double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
     if (points != NULL) print_points(out, m, points);
 }
 
@@ -225,12 +249,14 @@ static json_t *stats_json(const mospt_metadata *m, const mospt_point_figures *f)
     for (uint32_t k = 0; k < m->schema.count; k++) {
         const mospt_attribute *a = &m->schema.at[k];
         json_object_set_new(attributes, a->name,
-                            json_pack("{s:o, s:o, s:o}", "min", components_json(f->attribute_min[k], a->components), "max",
+                            json_pack("{s:o, s:o, s:o}", "min",
+                                      components_json(f->attribute_min[k], a->components), "max",
                                       components_json(f->attribute_max[k], a->components), "mean",
                                       components_json(f->attribute_mean[k], a->components)));
     }
-    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "min", cli_triple_json(f->low), "max", cli_triple_json(f->high), "mean",
-                     cli_triple_json(f->mean), "mean_rgb", f->has_rgb ? cli_triple_json(f->mean_rgb) : json_null(), "attributes",
+    return json_pack("{s:o, s:o, s:o, s:o, s:o}", "min", cli_triple_json(f->low), "max",
+                     cli_triple_json(f->high), "mean", cli_triple_json(f->mean), "mean_rgb",
+                     f->has_rgb ? cli_triple_json(f->mean_rgb) : json_null(), "attributes",
                      attributes);
 }
 
@@ -238,9 +264,9 @@ static json_t *attributes_json(const mospt_schema *schema)
 {
     json_t *array = json_array();
     for (uint32_t k = 0; k < schema->count; k++)
-        json_array_append_new(array, json_pack("{s:s, s:s, s:i}", "name", schema->at[k].name, "type",
-                                               mospt_type_name(schema->at[k].type), "components",
-                                               (int)schema->at[k].components));
+        json_array_append_new(array, json_pack("{s:s, s:s, s:i}", "name", schema->at[k].name,
+                                               "type", mospt_type_name(schema->at[k].type),
+                                               "components", (int)schema->at[k].components));
     return array;
 }
 
@@ -248,25 +274,29 @@ void cli_report_info_json(FILE *out, const mospt_dataset *d, const mospt_tree_fi
                           const mospt_point_figures *points, const mospt_spt_figures *spt)
 {
     const mospt_metadata *m = &d->metadata;
-    json_t *json = json_pack(
-        "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:{s:f, s:f, s:i}, s:f, s:i}", "dataset", cli_text_json(d->path), "points",
-        (json_int_t)m->point_count, "generation", (json_int_t)m->generation, "bounds", bounds_json(m), "attributes",
-        attributes_json(&m->schema), "sources", sources_json(m), "crs", cli_text_json(m->crs), "grid", "step", m->grid.step,
-        "cube", m->grid.step * (double)(UINT64_C(1) << m->grid.bits), "bits", (int)m->grid.bits, "position_error",
-        m->position_error, "inner_depth", (int)m->inner_depth);
+    json_t *json =
+        json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:{s:f, s:f, s:i}, s:f, s:i}", "dataset",
+                  cli_text_json(d->path), "points", (json_int_t)m->point_count, "generation",
+                  (json_int_t)m->generation, "bounds", bounds_json(m), "attributes",
+                  attributes_json(&m->schema), "sources", sources_json(m), "crs",
+                  cli_text_json(m->crs), "grid", "step", m->grid.step, "cube",
+                  m->grid.step * (double)(UINT64_C(1) << m->grid.bits), "bits", (int)m->grid.bits,
+                  "position_error", m->position_error, "inner_depth", (int)m->inner_depth);
     json_object_set_new(json, "tree",
-                        json_pack("{s:I, s:I, s:I, s:f, s:f}", "nodes", (json_int_t)t->nodes, "leaves", (json_int_t)t->leaves,
-                                  "levels", (json_int_t)t->levels, "branching", t->branching, "cell_branching",
-                                  t->cell_branching));
+                        json_pack("{s:I, s:I, s:I, s:f, s:f}", "nodes", (json_int_t)t->nodes,
+                                  "leaves", (json_int_t)t->leaves, "levels", (json_int_t)t->levels,
+                                  "branching", t->branching, "cell_branching", t->cell_branching));
     json_object_set_new(json, "points_per_mospt",
-                        json_pack("{s:I, s:I, s:I, s:f}", "min", (json_int_t)t->points_min, "max", (json_int_t)t->points_max,
-                                  "median", (json_int_t)t->points_median, "mean", t->points_mean));
+                        json_pack("{s:I, s:I, s:I, s:f}", "min", (json_int_t)t->points_min, "max",
+                                  (json_int_t)t->points_max, "median", (json_int_t)t->points_median,
+                                  "mean", t->points_mean));
     if (spt != NULL)
-        json_object_set_new(json, "classic_spt",
-                            json_pack("{s:I, s:I, s:I, s:f, s:f}", "interior_nodes", (json_int_t)spt->interior, "bytes",
-                                      (json_int_t)spt->classic_bytes, "mospt_bytes", (json_int_t)spt->mospt_bytes,
-                                      "branching", spt->branching, "overhead",
-                                      (double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
+        json_object_set_new(
+            json, "classic_spt",
+            json_pack("{s:I, s:I, s:I, s:f, s:f}", "interior_nodes", (json_int_t)spt->interior,
+                      "bytes", (json_int_t)spt->classic_bytes, "mospt_bytes",
+                      (json_int_t)spt->mospt_bytes, "branching", spt->branching, "overhead",
+                      (double)spt->classic_bytes / (double)spt->mospt_bytes - 1));
     if (points != NULL) json_object_set_new(json, "stats", stats_json(m, points));
     cli_write_json(out, json);
 }

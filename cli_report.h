@@ -23,7 +23,8 @@ void cli_report_info_json(FILE *out, const mospt_dataset *dataset, const mospt_t
 
 /* scans: [count] of one file */
 void cli_report_scans(FILE *out, const char *path, const prep_inspection *scans, uint32_t count);
-void cli_report_scans_json(FILE *out, const char *path, const prep_inspection *scans, uint32_t count);
+void cli_report_scans_json(FILE *out, const char *path, const prep_inspection *scans,
+                           uint32_t count);
 
 void cli_report_each(FILE *out, const cli_each_report *report);
 void cli_report_each_json(FILE *out, const char *output, const cli_each_report *report);

@@ -32,7 +32,8 @@ json_t *cli_text_json(const char *text)
 json_t *cli_triple_json(const double v[3])
 {
     json_t *array = json_array();
-    for (int a = 0; a < 3; a++) json_array_append_new(array, json_real(v[a]));
+    for (int a = 0; a < 3; a++)
+        json_array_append_new(array, json_real(v[a]));
     return array;
 }
 
@@ -47,4 +48,3 @@ void cli_print_triple(FILE *out, const double v[3])
 {
     fprintf(out, "%.3f  %.3f  %.3f", v[0], v[1], v[2]);
 }
-

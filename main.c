@@ -44,7 +44,8 @@ static int fail(const mospt_err *err)
 
 static int misuse(cli_command command, const char *what)
 {
-    fprintf(stderr, "instantpoints %s: %s (`instantpoints help %s`)\n", cli_command_name(command), what, cli_command_name(command));
+    fprintf(stderr, "instantpoints %s: %s (`instantpoints help %s`)\n", cli_command_name(command),
+            what, cli_command_name(command));
     return EXIT_WRONG_USE;
 }
 
@@ -54,27 +55,39 @@ static bool on_build_progress(void *context, const prep_progress *now)
     return !stop_asked;
 }
 
-static void on_build_announce(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
+static void on_build_announce(void *context, uint64_t points, uint64_t scratch_bytes,
+                              uint64_t output_bytes)
 {
     const cli_progress *progress = context;
     if (!progress->quiet) cli_report_announcement(points, scratch_bytes, output_bytes);
 }
 
-static prep_build_options build_options(const cli_options *o, const char *output, cli_progress *progress)
+static prep_build_options build_options(const cli_options *o, const char *output,
+                                        cli_progress *progress)
 {
     return (prep_build_options){
-        .inputs = o->paths, .input_count = o->path_count, .output = output, .temp_dir = o->temp_dir, .force = o->force,
-        .threads = o->threads, .memory = o->memory, .inner_depth = o->inner_depth, .crs = o->crs,
-        .progress = on_build_progress, .context = progress,
+        .inputs = o->paths,
+        .input_count = o->path_count,
+        .output = output,
+        .temp_dir = o->temp_dir,
+        .force = o->force,
+        .threads = o->threads,
+        .memory = o->memory,
+        .inner_depth = o->inner_depth,
+        .crs = o->crs,
+        .progress = on_build_progress,
+        .context = progress,
     };
 }
 
 /* Columns, poses and crop. The list of poses is the caller's to release. */
-static bool read_scan_options(const cli_options *o, prep_pose_list *poses, prep_scan_options *out, mospt_err *err)
+static bool read_scan_options(const cli_options *o, prep_pose_list *poses, prep_scan_options *out,
+                              mospt_err *err)
 {
     *poses = (prep_pose_list){0};
     *out = (prep_scan_options){.columns = o->columns, .poses = poses, .has_crop = o->has_crop};
-    for (int a = 0; a < 3; a++) out->crop_low[a] = o->crop[a], out->crop_high[a] = o->crop[a + 3];
+    for (int a = 0; a < 3; a++)
+        out->crop_low[a] = o->crop[a], out->crop_high[a] = o->crop[a + 3];
     return o->poses == NULL || prep_pose_list_read(o->poses, poses, err);
 }
 
@@ -87,8 +100,8 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
     prep_build_options options = build_options(o, output, &progress);
     options.announce = on_build_announce;
     if (!read_scan_options(o, &poses, &options.scans, err)) return EXIT_FAILED;
-    /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit is that of the process.
-     * A renderer is better served by the allocator's own ways. */
+    /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit
+     * is that of the process. A renderer is better served by the allocator's own ways. */
     mallopt(M_MMAP_THRESHOLD, 64 << 10);
     bool ok = prep_build(&options, &result, err);
     mallopt(M_MMAP_THRESHOLD, 32 << 20);
@@ -97,7 +110,9 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
     if (ok || result.source.left_out_count > 1) cli_report_losses(&result);
     if (ok && o->json && words) cli_report_build_json(stdout, output, &result);
     else if (ok && words) cli_report_build(stdout, output, &result);
-    int code = !ok ? EXIT_FAILED : prep_build_left_something_out(&result) ? EXIT_LEFT_OUT : EXIT_DONE;
+    int code = !ok                                      ? EXIT_FAILED
+               : prep_build_left_something_out(&result) ? EXIT_LEFT_OUT
+                                                        : EXIT_DONE;
     prep_build_result_fini(&result);
     return code;
 }
@@ -129,7 +144,8 @@ static int build_each(const cli_options *o)
     else if (ok) cli_report_each(stdout, &report);
     for (size_t i = 0; i < report.count; i++) {
         failed += report.items[i].status == CLI_EACH_FAILED;
-        lacking += report.items[i].status == CLI_EACH_FAILED || report.items[i].status == CLI_EACH_IN_PART;
+        lacking +=
+            report.items[i].status == CLI_EACH_FAILED || report.items[i].status == CLI_EACH_IN_PART;
     }
     bool none = failed == report.count;
     cli_each_fini(&report);
@@ -141,7 +157,9 @@ static int command_build(const cli_options *o)
 {
     mospt_err err = {0};
     if (o->path_count == 0) return misuse(o->command, "which scans?");
-    if (o->output == NULL) return misuse(o->command, o->each ? "where to? -o FOLDER says it" : "where to? -o NAME.ipts says it");
+    if (o->output == NULL)
+        return misuse(o->command,
+                      o->each ? "where to? -o FOLDER says it" : "where to? -o NAME.ipts says it");
     if (o->each) return build_each(o);
     int code = build_to(o, o->output, true, &err);
     return code == EXIT_FAILED ? fail(&err) : code;
@@ -150,7 +168,8 @@ static int command_build(const cli_options *o)
 static bool is_dataset_name(const char *path)
 {
     size_t n = strlen(path);
-    while (n > 1 && path[n - 1] == '/') n--;
+    while (n > 1 && path[n - 1] == '/')
+        n--;
     return mospt_dataset_exists(path) || (n > 5 && strncmp(path + n - 5, ".ipts", 5) == 0);
 }
 
@@ -161,17 +180,20 @@ static int info_of_scans(const cli_options *o)
     prep_scan_options options;
     prep_inspection *scans = malloc(sizeof *scans);
     uint32_t count = 1;
-    bool ok = read_scan_options(o, &poses, &options, &err) && (scans != NULL || mospt_err_nomem(&err, sizeof *scans)) &&
+    bool ok = read_scan_options(o, &poses, &options, &err) &&
+              (scans != NULL || mospt_err_nomem(&err, sizeof *scans)) &&
               prep_inspect(o->paths[0], 0, &options, o->stats, &scans[0], &err);
     if (ok && scans[0].info.scan_count > 1) {
         count = scans[0].info.scan_count;
         prep_inspection *all = realloc(scans, count * sizeof *scans);
         ok = all != NULL || mospt_err_nomem(&err, count * sizeof *scans);
         if (ok) scans = all;
-        for (uint32_t i = 1; ok && i < count; i++) ok = prep_inspect(o->paths[0], i, &options, o->stats, &scans[i], &err);
+        for (uint32_t i = 1; ok && i < count; i++)
+            ok = prep_inspect(o->paths[0], i, &options, o->stats, &scans[i], &err);
     }
     bool damaged = false;
-    for (uint32_t i = 0; ok && i < count; i++) damaged = damaged || scans[i].damage.code != MOSPT_OK;
+    for (uint32_t i = 0; ok && i < count; i++)
+        damaged = damaged || scans[i].damage.code != MOSPT_OK;
     if (ok && o->json) cli_report_scans_json(stdout, o->paths[0], scans, count);
     else if (ok) cli_report_scans(stdout, o->paths[0], scans, count);
     free(scans);
@@ -193,7 +215,8 @@ static int command_info(const cli_options *o)
     bool read = o->stats || dataset->metadata.point_count <= INFO_READS_POINTS;
     if (o->stats && (points = malloc(sizeof *points)) == NULL) {
         mospt_err_nomem(&err, sizeof *points);
-    } else if (mospt_survey_tree(dataset, &tree, &err) && (!read || mospt_survey_points(dataset, points, &spt, &err))) {
+    } else if (mospt_survey_tree(dataset, &tree, &err) &&
+               (!read || mospt_survey_points(dataset, points, &spt, &err))) {
         if (o->json) cli_report_info_json(stdout, dataset, &tree, points, read ? &spt : NULL);
         else cli_report_info(stdout, dataset, &tree, points, read ? &spt : NULL);
         code = EXIT_DONE;
@@ -204,7 +227,8 @@ static int command_info(const cli_options *o)
     return code;
 }
 
-/* What `view` and `shot` look at: a dataset that was named, or one that is built of the scans that were. */
+/* What `view` and `shot` look at: a dataset that was named, or one that is built of the scans that
+ * were. */
 typedef struct {
     mospt_dataset *dataset;
     char folder[4096]; /* of a temporary dataset, "" otherwise */
@@ -224,7 +248,8 @@ static bool make_temporary_folder(const cli_options *o, char folder[4096], mospt
 static bool place_open(const cli_options *o, const char *output, place *p, mospt_err *err)
 {
     *p = (place){0};
-    if (o->path_count == 1 && is_dataset_name(o->paths[0])) return mospt_dataset_open(o->paths[0], &p->dataset, err);
+    if (o->path_count == 1 && is_dataset_name(o->paths[0]))
+        return mospt_dataset_open(o->paths[0], &p->dataset, err);
     char path[4200];
     snprintf(path, sizeof path, "%s", output != NULL ? output : "");
     if (output == NULL) {
@@ -246,22 +271,24 @@ static void warn_of_damage(uint32_t nodes, const mospt_err *first)
     char text[2048];
     if (nodes == 0) return;
     mospt_err_text(first, text, sizeof text);
-    fprintf(stderr, "instantpoints: %u damaged node%s not shown: %s\n", nodes, nodes == 1 ? " is" : "s are", text);
+    fprintf(stderr, "instantpoints: %u damaged node%s not shown: %s\n", nodes,
+            nodes == 1 ? " is" : "s are", text);
 }
 
 static void report_shot(const cli_options *o, const rend_shot_result *r)
 {
     if (!o->json) {
-        printf("%s: %llu points in %u nodes, %.0f ms on %s\n", o->output, (unsigned long long)r->points_drawn, r->nodes_drawn,
-               r->total_ms, r->renderer);
+        printf("%s: %llu points in %u nodes, %.0f ms on %s\n", o->output,
+               (unsigned long long)r->points_drawn, r->nodes_drawn, r->total_ms, r->renderer);
         return;
     }
-    json_t *json = json_pack("{s:s, s:I, s:o, s:I, s:I, s:b, s:I, s:I, s:f, s:s}", "picture", o->output, "points_drawn",
-                             (json_int_t)r->points_drawn, "budget",
-                             r->budget_points == REND_ALL ? json_null() : json_integer((json_int_t)r->budget_points),
-                             "points_in_view", (json_int_t)r->points_in_view, "nodes_drawn", (json_int_t)r->nodes_drawn,
-                             "budget_spent", (int)r->budget_spent, "loaded_bytes", (json_int_t)r->loaded_bytes,
-                             "damaged_nodes", (json_int_t)r->damaged_nodes, "ms", r->total_ms, "renderer", r->renderer);
+    json_t *json = json_pack(
+        "{s:s, s:I, s:o, s:I, s:I, s:b, s:I, s:I, s:f, s:s}", "picture", o->output, "points_drawn",
+        (json_int_t)r->points_drawn, "budget",
+        r->budget_points == REND_ALL ? json_null() : json_integer((json_int_t)r->budget_points),
+        "points_in_view", (json_int_t)r->points_in_view, "nodes_drawn", (json_int_t)r->nodes_drawn,
+        "budget_spent", (int)r->budget_spent, "loaded_bytes", (json_int_t)r->loaded_bytes,
+        "damaged_nodes", (json_int_t)r->damaged_nodes, "ms", r->total_ms, "renderer", r->renderer);
     json_dumpf(json, stdout, JSON_INDENT(2));
     putchar('\n');
     json_decref(json);
@@ -274,8 +301,12 @@ static int command_shot(const cli_options *o)
     rend_shot_result result = {0};
     if (o->path_count == 0) return misuse(o->command, "of what?");
     if (o->output == NULL) return misuse(o->command, "where to? -o PICTURE.png says it");
-    const rend_shot_options options = {.path = o->output, .width = o->width, .height = o->height, .camera = o->camera,
-                                       .look = o->look, .limits = o->limits};
+    const rend_shot_options options = {.path = o->output,
+                                       .width = o->width,
+                                       .height = o->height,
+                                       .camera = o->camera,
+                                       .look = o->look,
+                                       .limits = o->limits};
     bool ok = place_open(o, NULL, &p, &err) && rend_shot(p.dataset, &options, &result, &err);
     if (ok) {
         report_shot(o, &result);
@@ -292,12 +323,18 @@ static int command_view(const cli_options *o)
     place p;
     rend_view_result result = {0};
     if (o->path_count == 0) return misuse(o->command, "of what?");
-    const rend_view_options options = {.width = o->width, .height = o->height, .camera = o->camera, .look = o->look,
-                                       .limits = o->limits, .frames = o->frames, .screenshot = o->screenshot,
+    const rend_view_options options = {.width = o->width,
+                                       .height = o->height,
+                                       .camera = o->camera,
+                                       .look = o->look,
+                                       .limits = o->limits,
+                                       .frames = o->frames,
+                                       .screenshot = o->screenshot,
                                        .should_stop = should_stop};
     bool ok = place_open(o, o->output, &p, &err) && rend_view(p.dataset, &options, &result, &err);
     if (ok) warn_of_damage(result.damaged_nodes, &result.damage);
-    if (ok && result.no_words.code != MOSPT_OK) fail(&result.no_words); /* the picture was there all the same */
+    if (ok && result.no_words.code != MOSPT_OK)
+        fail(&result.no_words); /* the picture was there all the same */
     if (ok && result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     place_close(&p);
     return ok ? p.code : fail(&err);
@@ -332,7 +369,8 @@ static int command_check(const cli_options *o)
     mospt_check_result result = {0};
     if (o->path_count != 1) return misuse(o->command, "one dataset is wanted");
     check_context context = {.findings = json_array()};
-    const mospt_check_options options = {.found = on_finding, .progress = on_check_progress, .context = &context};
+    const mospt_check_options options = {
+        .found = on_finding, .progress = on_check_progress, .context = &context};
     cli_progress_start(&context.progress, o->quiet);
     bool looked = mospt_dataset_open(o->paths[0], &dataset, &err);
     if (!looked) {
@@ -345,16 +383,19 @@ static int command_check(const cli_options *o)
     }
     bool good = looked && result.findings == 0;
     if (o->json) {
-        json_t *json = json_pack("{s:b, s:I, s:I, s:O}", "ok", (int)good, "points", (json_int_t)result.points, "nodes",
-                                 (json_int_t)(looked && dataset != NULL ? dataset->hierarchy.count : 0), "findings", context.findings);
+        json_t *json = json_pack(
+            "{s:b, s:I, s:I, s:O}", "ok", (int)good, "points", (json_int_t)result.points, "nodes",
+            (json_int_t)(looked && dataset != NULL ? dataset->hierarchy.count : 0), "findings",
+            context.findings);
         json_dumpf(json, stdout, JSON_INDENT(2));
         putchar('\n');
         json_decref(json);
     } else if (good) {
-        printf("%s: %llu points in %u nodes are all there and right\n", o->paths[0], (unsigned long long)result.points,
-               dataset->hierarchy.count);
+        printf("%s: %llu points in %u nodes are all there and right\n", o->paths[0],
+               (unsigned long long)result.points, dataset->hierarchy.count);
     } else if (result.findings > 0) {
-        printf("%s: %llu finding%s\n", o->paths[0], (unsigned long long)result.findings, result.findings == 1 ? "" : "s");
+        printf("%s: %llu finding%s\n", o->paths[0], (unsigned long long)result.findings,
+               result.findings == 1 ? "" : "s");
     }
     json_decref(context.findings);
     mospt_dataset_close(dataset);
@@ -371,7 +412,8 @@ static int print_help(char *text, FILE *out)
 static int help(int argc, char **argv)
 {
     cli_command command;
-    if (argc > 2 && cli_command_from_name(argv[2], &command)) return print_help(cli_command_help(command), stdout);
+    if (argc > 2 && cli_command_from_name(argv[2], &command))
+        return print_help(cli_command_help(command), stdout);
     if (argc <= 2) return print_help(cli_help(), stdout);
     fprintf(stderr, "instantpoints: there is no command %s\n", argv[2]);
     return EXIT_WRONG_USE;
@@ -380,7 +422,8 @@ static int help(int argc, char **argv)
 int main(int argc, char **argv)
 {
     static int (*const run[CLI_COMMANDS])(const cli_options *) = {
-        [CLI_BUILD] = command_build, [CLI_VIEW] = command_view, [CLI_SHOT] = command_shot, [CLI_INFO] = command_info, [CLI_CHECK] = command_check,
+        [CLI_BUILD] = command_build, [CLI_VIEW] = command_view,   [CLI_SHOT] = command_shot,
+        [CLI_INFO] = command_info,   [CLI_CHECK] = command_check,
     };
     cli_command command;
     cli_options options;
@@ -388,13 +431,17 @@ int main(int argc, char **argv)
     struct sigaction action = {.sa_handler = ask_to_stop, .sa_flags = (int)SA_RESETHAND};
 
     if (argc < 2) return print_help(cli_help(), stderr);
-    if (strcmp(argv[1], "help") == 0 || strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) return help(argc, argv);
-    if (strcmp(argv[1], "--version") == 0) return printf("instantpoints %s\n", IPTS_VERSION), EXIT_DONE;
+    if (strcmp(argv[1], "help") == 0 || strcmp(argv[1], "--help") == 0 ||
+        strcmp(argv[1], "-h") == 0)
+        return help(argc, argv);
+    if (strcmp(argv[1], "--version") == 0)
+        return printf("instantpoints %s\n", IPTS_VERSION), EXIT_DONE;
     if (!cli_command_from_name(argv[1], &command)) {
         fprintf(stderr, "instantpoints: there is no command %s (`instantpoints help`)\n", argv[1]);
         return EXIT_WRONG_USE;
     }
-    if (!cli_options_read(command, argc - 1, argv + 1, &options, &err)) return misuse(command, err.message);
+    if (!cli_options_read(command, argc - 1, argv + 1, &options, &err))
+        return misuse(command, err.message);
     if (options.help) return print_help(cli_command_help(command), stdout);
     signal(SIGXFSZ, SIG_IGN); /* a file-size limit is an error of the write that meets it */
     sigaction(SIGINT, &action, NULL);

@@ -1,15 +1,16 @@
 /* mospt/cell.h - cells of the nested octree as bit strings, without any floating-point box.
  *
- * A node of the outer octree is a cube: a level (0 is the root), and the grid coordinates of its low corner. It is
- * 2^(bits - level) steps wide; from level `bits` on, where the grid has no finer position, every level is one step wide and
- * all points fall into octant 0. Inside a node, the cell of a point at depth i is the next i bits of each coordinate, here
- * as a Morton code of 3 i bits: x is bit 0, y bit 1, z bit 2 of each octant. */
+ * A node of the outer octree is a cube: a level (0 is the root), and the grid coordinates of its
+ * low corner. It is 2^(bits - level) steps wide; from level `bits` on, where the grid has no finer
+ * position, every level is one step wide and all points fall into octant 0. Inside a node, the cell
+ * of a point at depth i is the next i bits of each coordinate, here as a Morton code of 3 i bits: x
+ * is bit 0, y bit 1, z bit 2 of each octant. */
 #pragma once
 #include "mospt/grid.h"
 
 enum {
     MOSPT_DEPTH_MIN = 1,
-    MOSPT_DEPTH_MAX = 9,   /* of an inner octree: its finest cells are then numbered in 27 bits */
+    MOSPT_DEPTH_MAX = 9,    /* of an inner octree: its finest cells are then numbered in 27 bits */
     MOSPT_CODE_LEVELS = 21, /* that a 64-bit Morton code holds */
 };
 
@@ -37,8 +38,9 @@ static inline uint64_t mospt_morton_spread(uint64_t v)
     return v;
 }
 
-/* Morton code of the first `depth` (at most 21) levels below a node that is 2^cell_bits steps wide. The point must lie in
- * the node: of its coordinates only the lower cell_bits are looked at. Below the grid's resolution the code ends in zeros. */
+/* Morton code of the first `depth` (at most 21) levels below a node that is 2^cell_bits steps wide.
+ * The point must lie in the node: of its coordinates only the lower cell_bits are looked at. Below
+ * the grid's resolution the code ends in zeros. */
 static inline uint64_t mospt_cell_code(uint32_t x, uint32_t y, uint32_t z, uint32_t cell_bits,
                                        uint32_t depth)
 {
@@ -55,8 +57,8 @@ static inline uint64_t mospt_cell_code(uint32_t x, uint32_t y, uint32_t z, uint3
 }
 
 /* True if a point lies in the node at `level` whose low corner is `corner`. */
-static inline bool mospt_cell_contains(const mospt_grid *grid, const uint32_t corner[3], uint32_t level,
-                                       uint32_t x, uint32_t y, uint32_t z)
+static inline bool mospt_cell_contains(const mospt_grid *grid, const uint32_t corner[3],
+                                       uint32_t level, uint32_t x, uint32_t y, uint32_t z)
 {
     uint32_t bits = mospt_cell_bits(grid, level);
     return ((uint64_t)x >> bits) == ((uint64_t)corner[0] >> bits) &&
@@ -65,10 +67,11 @@ static inline bool mospt_cell_contains(const mospt_grid *grid, const uint32_t co
 }
 
 /* Low corner of child `octant` of a node at `level`. Below the resolution only octant 0 exists. */
-static inline void mospt_cell_child(const mospt_grid *grid, const uint32_t corner[3], uint32_t level,
-                                    uint32_t octant, uint32_t out[3])
+static inline void mospt_cell_child(const mospt_grid *grid, const uint32_t corner[3],
+                                    uint32_t level, uint32_t octant, uint32_t out[3])
 {
     uint32_t bits = mospt_cell_bits(grid, level);
     for (int a = 0; a < 3; a++)
-        out[a] = corner[a] + (bits > 0 && (octant >> a & 1) ? (uint32_t)(UINT64_C(1) << (bits - 1)) : 0);
+        out[a] =
+            corner[a] + (bits > 0 && (octant >> a & 1) ? (uint32_t)(UINT64_C(1) << (bits - 1)) : 0);
 }

@@ -13,12 +13,12 @@ typedef struct {
     const mospt_dataset *dataset;
     const mospt_check_options *options;
     mospt_check_result *result;
-    uint8_t *payload;          /* of the largest node */
-    uint32_t *codes;           /* of its points, finest cells */
-    uint8_t *cells;            /* one bit for each finest cell, all zero between uses */
+    uint8_t *payload; /* of the largest node */
+    uint32_t *codes;  /* of its points, finest cells */
+    uint8_t *cells;   /* one bit for each finest cell, all zero between uses */
     uint64_t points_hash;
     uint32_t low[3], high[3];
-    uint64_t *of_source;       /* [source_count] points */
+    uint64_t *of_source; /* [source_count] points */
 } checker;
 
 static void report(checker *c, const mospt_err *err)
@@ -31,9 +31,11 @@ static void report(checker *c, const mospt_err *err)
 static void report_node(checker *c, uint32_t node, uint32_t point, const char *what)
 {
     const mospt_node *n = &c->dataset->hierarchy.nodes[node];
-    char *path = mospt_file_join(c->dataset->path, c->dataset->metadata.files[n->payload_file].name);
+    char *path =
+        mospt_file_join(c->dataset->path, c->dataset->metadata.files[n->payload_file].name);
     mospt_err err;
-    mospt_err_set(&err, MOSPT_EFORMAT, mospt_at_byte(path, n->payload_offset + point * sizeof(mospt_vertex)),
+    mospt_err_set(&err, MOSPT_EFORMAT,
+                  mospt_at_byte(path, n->payload_offset + point * sizeof(mospt_vertex)),
                   "node %" PRIu32 ": %s", node, what);
     free(path);
     report(c, &err);
@@ -43,7 +45,8 @@ static void check_places(checker *c, uint32_t node, const mospt_vertex *v)
 {
     const mospt_node *n = &c->dataset->hierarchy.nodes[node];
     for (uint32_t i = 0; i < n->count; i++) {
-        if (!mospt_cell_contains(&c->dataset->metadata.grid, n->corner, n->level, v[i].x, v[i].y, v[i].z)) {
+        if (!mospt_cell_contains(&c->dataset->metadata.grid, n->corner, n->level, v[i].x, v[i].y,
+                                 v[i].z)) {
             report_node(c, node, i, "a point lies outside the cube of its node");
             return;
         }
@@ -55,7 +58,8 @@ static bool bit_is_set(const uint8_t *cells, uint32_t cell)
     return cells[cell >> 3] >> (cell & 7) & 1;
 }
 
-/* The first level_end[i] points lie one in each occupied cell of depth i, in Morton order within what the level adds. */
+/* The first level_end[i] points lie one in each occupied cell of depth i, in Morton order within
+ * what the level adds. */
 static void check_levels(checker *c, uint32_t node)
 {
     const mospt_node *n = &c->dataset->hierarchy.nodes[node];
@@ -66,26 +70,33 @@ static void check_levels(checker *c, uint32_t node)
         uint32_t shift = 3 * (depth - level), end = n->level_end[level];
         for (at = 0; at < end && wrong == NULL; at++) {
             uint32_t cell = c->codes[at] >> shift;
-            if (bit_is_set(c->cells, cell)) wrong = "two points of a level share a cell of its depth";
+            if (bit_is_set(c->cells, cell))
+                wrong = "two points of a level share a cell of its depth";
             c->cells[cell >> 3] |= (uint8_t)(1u << (cell & 7));
         }
         for (; at < n->count && wrong == NULL; at++)
-            if (!bit_is_set(c->cells, c->codes[at] >> shift)) wrong = "an occupied cell has no point in its level";
-        for (uint32_t i = 0; i < end; i++) c->cells[c->codes[i] >> shift >> 3] = 0;
+            if (!bit_is_set(c->cells, c->codes[at] >> shift))
+                wrong = "an occupied cell has no point in its level";
+        for (uint32_t i = 0; i < end; i++)
+            c->cells[c->codes[i] >> shift >> 3] = 0;
     }
-    for (uint32_t level = 0, begin = 0; level <= depth + 1 && wrong == NULL; begin = n->level_end[level++])
+    for (uint32_t level = 0, begin = 0; level <= depth + 1 && wrong == NULL;
+         begin = n->level_end[level++])
         for (at = begin + 1; at < n->level_end[level] && wrong == NULL; at++)
-            if (c->codes[at] < c->codes[at - 1]) wrong = "points of a level are not in Morton order";
+            if (c->codes[at] < c->codes[at - 1])
+                wrong = "points of a level are not in Morton order";
     if (wrong != NULL) report_node(c, node, at > 0 ? at - 1 : 0, wrong);
 }
 
-/* Octants with a child reject: no two of their points share a finest cell. The others add, but no more than the threshold. */
+/* Octants with a child reject: no two of their points share a finest cell. The others add, but no
+ * more than the threshold. */
 static void check_strategy(checker *c, uint32_t node)
 {
     const mospt_node *n = &c->dataset->hierarchy.nodes[node];
     const mospt_metadata *m = &c->dataset->metadata;
     uint32_t depth = m->inner_depth, added[MOSPT_CHILDREN_MAX] = {0};
-    if (mospt_cell_bits(&m->grid, n->level) == 0) return; /* a pile: all points are at one position */
+    if (mospt_cell_bits(&m->grid, n->level) == 0)
+        return; /* a pile: all points are at one position */
     for (uint32_t i = n->level_end[depth]; i < n->count; i++) {
         uint32_t octant = c->codes[i] >> 3 * (depth - 1);
         if (n->child_mask >> octant & 1) {
@@ -93,7 +104,8 @@ static void check_strategy(checker *c, uint32_t node)
             return;
         }
         if (++added[octant] == m->add_threshold) {
-            report_node(c, node, i, "an octant holds so many points beside others that it should have a child");
+            report_node(c, node, i,
+                        "an octant holds so many points beside others that it should have a child");
             return;
         }
     }
@@ -153,7 +165,8 @@ static bool check_subtrees(checker *c, mospt_err *err)
     const mospt_hierarchy *h = &c->dataset->hierarchy;
     uint64_t *below = malloc(h->count * sizeof *below);
     if (below == NULL) return mospt_err_nomem(err, h->count * sizeof *below);
-    for (uint32_t i = 0; i < h->count; i++) below[i] = h->nodes[i].count;
+    for (uint32_t i = 0; i < h->count; i++)
+        below[i] = h->nodes[i].count;
     for (uint32_t i = h->count; i-- > 1;) {
         below[h->nodes[i].parent] += below[i];
         if (below[i] < c->dataset->metadata.add_threshold)
@@ -183,7 +196,8 @@ static bool check_files(checker *c, mospt_err *err)
     range *ranges = malloc(h->count * sizeof *ranges);
     if (ranges == NULL) return mospt_err_nomem(err, h->count * sizeof *ranges);
     for (uint32_t i = 0; i < h->count; i++)
-        ranges[i] = (range){h->nodes[i].payload_offset, h->nodes[i].payload_size, h->nodes[i].payload_file, i};
+        ranges[i] = (range){h->nodes[i].payload_offset, h->nodes[i].payload_size,
+                            h->nodes[i].payload_file, i};
     qsort(ranges, h->count, sizeof *ranges, compare_ranges);
     uint32_t i = 0;
     for (uint32_t f = 0; f < d->metadata.file_count; f++) {
@@ -193,15 +207,19 @@ static bool check_files(checker *c, mospt_err *err)
         struct stat status;
         for (; i < h->count && ranges[i].file == f; end = ranges[i].offset + ranges[i].size, i++) {
             if (ranges[i].offset == end) continue;
-            mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_byte(path, end), "the payload of node %" PRIu32 " does not begin where the one before it ends",
+            mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_byte(path, end),
+                          "the payload of node %" PRIu32
+                          " does not begin where the one before it ends",
                           ranges[i].node);
             report(c, &what);
         }
         if (end != d->metadata.files[f].size) {
-            mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_byte(path, end), "bytes that belong to no node");
+            mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_byte(path, end),
+                          "bytes that belong to no node");
             report(c, &what);
         }
-        if (fstat(d->fd[f], &status) == 0 && (uint64_t)status.st_size != d->metadata.files[f].size) {
+        if (fstat(d->fd[f], &status) == 0 &&
+            (uint64_t)status.st_size != d->metadata.files[f].size) {
             mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_byte(path, d->metadata.files[f].size),
                           "the file should end here, and has %" PRIu64 " bytes more",
                           (uint64_t)status.st_size - d->metadata.files[f].size);
@@ -220,34 +238,43 @@ static void check_totals(checker *c)
     char *path = mospt_file_join(c->dataset->path, "metadata.json");
     if (c->points_hash != m->points_hash) {
         mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_file(path),
-                      "points are not those that were read: their checksum is %016" PRIx64 ", not %016" PRIx64,
+                      "points are not those that were read: their checksum is %016" PRIx64
+                      ", not %016" PRIx64,
                       c->points_hash, m->points_hash);
         report(c, &what);
     }
     for (int a = 0; a < 3; a++) {
+        char axis = (char)('x' + a);
         double low = mospt_grid_axis_to_world(&m->grid, a, c->low[a]);
         double high = mospt_grid_axis_to_world(&m->grid, a, c->high[a]);
         if (low == m->low[a] && high == m->high[a]) continue;
-        mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_file(path), "%c reaches from %.17g to %.17g, not from %.17g to %.17g",
-                      "xyz"[a], low, high, m->low[a], m->high[a]);
+        mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_file(path),
+                      "%c reaches from %.17g to %.17g, not from %.17g to %.17g", axis, low, high,
+                      m->low[a], m->high[a]);
         report(c, &what);
     }
     for (uint32_t i = 0; i < m->source_count; i++) {
-        if (c->of_source[i] == m->sources[i].points || mospt_schema_find(&m->schema, "scan") < 0) continue;
-        mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_file(path), "%s has %" PRIu64 " points, not %" PRIu64,
-                      m->sources[i].name, c->of_source[i], m->sources[i].points);
+        if (c->of_source[i] == m->sources[i].points || mospt_schema_find(&m->schema, "scan") < 0)
+            continue;
+        mospt_err_set(&what, MOSPT_EFORMAT, mospt_at_file(path),
+                      "%s has %" PRIu64 " points, not %" PRIu64, m->sources[i].name,
+                      c->of_source[i], m->sources[i].points);
         report(c, &what);
     }
     free(path);
 }
 
-bool mospt_check(const mospt_dataset *d, const mospt_check_options *options, mospt_check_result *out, mospt_err *err)
+bool mospt_check(const mospt_dataset *d, const mospt_check_options *options,
+                 mospt_check_result *out, mospt_err *err)
 {
     bool ok = false;
     uint32_t largest = 0;
     uint32_t cell_bits = 3 * d->hierarchy.inner_depth;
     *out = (mospt_check_result){0};
-    checker c = {.dataset = d, .options = options, .result = out, .low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
+    checker c = {.dataset = d,
+                 .options = options,
+                 .result = out,
+                 .low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
     for (uint32_t i = 0; i < d->hierarchy.count; i++)
         if (d->hierarchy.nodes[i].count > largest) largest = d->hierarchy.nodes[i].count;
     size_t payload_size = largest * mospt_record_size(&d->metadata.schema);
@@ -262,7 +289,8 @@ bool mospt_check(const mospt_dataset *d, const mospt_check_options *options, mos
     if (!check_files(&c, err) || !check_subtrees(&c, err)) goto done;
     for (uint32_t i = 0; i < d->hierarchy.count; i++) {
         check_node(&c, i);
-        if (options->progress != NULL && !options->progress(options->context, i + 1, d->hierarchy.count)) {
+        if (options->progress != NULL &&
+            !options->progress(options->context, i + 1, d->hierarchy.count)) {
             mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
             goto done;
         }

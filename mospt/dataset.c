@@ -35,7 +35,8 @@ static bool open_payloads(mospt_dataset *d, mospt_err *err)
     uint32_t count = d->metadata.file_count;
     d->fd = malloc((count + 1) * sizeof *d->fd);
     if (d->fd == NULL) return mospt_err_nomem(err, (count + 1) * sizeof *d->fd);
-    for (uint32_t i = 0; i < count; i++) d->fd[i] = -1;
+    for (uint32_t i = 0; i < count; i++)
+        d->fd[i] = -1;
     for (uint32_t i = 0; i < count; i++) {
         const mospt_payload_file *file = &d->metadata.files[i];
         uint64_t size = 0;
@@ -45,7 +46,8 @@ static bool open_payloads(mospt_dataset *d, mospt_err *err)
         bool ok = d->fd[i] >= 0;
         if (ok && size < file->size)
             ok = mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(path, size),
-                               "the file ends here, metadata.json says %" PRIu64 " bytes", file->size);
+                               "the file ends here, metadata.json says %" PRIu64 " bytes",
+                               file->size);
         free(path);
         if (!ok) return false;
     }
@@ -87,7 +89,8 @@ bool mospt_dataset_open(const char *path, mospt_dataset **out, mospt_err *err)
     if (d->hierarchy.inner_depth != d->metadata.inner_depth ||
         d->hierarchy.point_count != d->metadata.point_count) {
         mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(hierarchy_path),
-                      "holds %" PRIu64 " points at inner depth %" PRIu32 ", metadata.json says %" PRIu64 " at %" PRIu32,
+                      "holds %" PRIu64 " points at inner depth %" PRIu32
+                      ", metadata.json says %" PRIu64 " at %" PRIu32,
                       d->hierarchy.point_count, d->hierarchy.inner_depth, d->metadata.point_count,
                       d->metadata.inner_depth);
         goto done;
@@ -110,18 +113,21 @@ static bool read_part(const mospt_dataset *d, uint32_t node, uint64_t skip, void
     bool ok = mospt_file_read_at(d->fd[n->payload_file], path, offset, out, size, err);
     if (ok && mospt_hash(out, size) != expected_hash)
         ok = mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(path, offset),
-                           "the %s of node %" PRIu32 " are damaged: their checksum is wrong", what, node);
+                           "the %s of node %" PRIu32 " are damaged: their checksum is wrong", what,
+                           node);
     free(path);
     return ok;
 }
 
-bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mospt_vertex *out, mospt_err *err)
+bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mospt_vertex *out,
+                                 mospt_err *err)
 {
     return read_part(dataset, node, 0, out, mospt_dataset_vertices_size(dataset, node),
                      dataset->hierarchy.nodes[node].vertices_hash, "vertices", err);
 }
 
-bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out, mospt_err *err)
+bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
+                                   mospt_err *err)
 {
     const mospt_node *n = &dataset->hierarchy.nodes[node];
     return read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,

@@ -1,42 +1,45 @@
 /* mospt/dataset.h - a dataset folder, opened for reading.
  *
- * metadata.json names and checks all other files; docs/format.md has every byte. A dataset that opens is consistent: its
- * hierarchy is valid and every payload lies inside its file. Payloads themselves are checked as they are read. */
+ * metadata.json names and checks all other files; docs/format.md has every byte. A dataset that
+ * opens is consistent: its hierarchy is valid and every payload lies inside its file. Payloads
+ * themselves are checked as they are read. */
 #pragma once
 #include "mospt/hierarchy.h"
 #include "mospt/point.h"
 #include "mospt/schema.h"
 
 typedef struct {
-    char *name;        /* owned, relative to the folder that was built from */
-    char *scan;        /* owned, name of the scan inside a file that holds several, else "" */
-    char *format;      /* owned, for people */
-    uint64_t points;   /* in the dataset */
-    uint64_t dropped;  /* the sum of the reasons */
+    char *name;           /* owned, relative to the folder that was built from */
+    char *scan;           /* owned, name of the scan inside a file that holds several, else "" */
+    char *format;         /* owned, for people */
+    uint64_t points;      /* in the dataset */
+    uint64_t dropped;     /* the sum of the reasons */
     char *drop_reason[8]; /* [reason_count], owned */
     uint64_t drop_count[8];
     uint32_t reason_count;
-    char *damage;      /* owned, what was wrong with the file; NULL: nothing */
+    char *damage; /* owned, what was wrong with the file; NULL: nothing */
     bool has_rgb, has_intensity;
     bool has_pose;
-    double pose[16];   /* scanner to world, row-major; already applied */
+    double pose[16];        /* scanner to world, row-major; already applied */
     double low[3], high[3]; /* of the points kept, metres */
 } mospt_source;
 
 typedef struct {
-    char *name;        /* owned, inside the folder */
-    uint64_t size;     /* bytes that belong to this generation */
+    char *name;    /* owned, inside the folder */
+    uint64_t size; /* bytes that belong to this generation */
 } mospt_payload_file;
 
 typedef struct {
     uint64_t generation;
     mospt_grid grid;
     mospt_schema schema;
-    uint32_t inner_depth;   /* of every MOSPT */
-    uint32_t add_threshold; /* a child octant exists only if it would get at least this many points */
+    uint32_t inner_depth; /* of every MOSPT */
+    uint32_t
+        add_threshold; /* a child octant exists only if it would get at least this many points */
     uint64_t point_count;
-    uint64_t points_hash;   /* sum modulo 2^64 of the hash of every record: conservation of points */
-    double position_error;  /* largest distance along an axis between a point and its grid position, metres */
+    uint64_t points_hash;  /* sum modulo 2^64 of the hash of every record: conservation of points */
+    double position_error; /* largest distance along an axis between a point and its grid position,
+                              metres */
     double low[3], high[3]; /* of all points, metres */
     char *crs;              /* owned, "" if unknown */
     mospt_source *sources;  /* [source_count], owned */
@@ -84,6 +87,7 @@ bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mo
                                  mospt_err *err);
 
 /* Reads all attribute planes of one node, as they are stored, and checks their hash.
- * out      [nodes[node].count * schema.row_size] bytes: plane after plane, in the order of the schema
- * threads  any */
-bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out, mospt_err *err);
+ * out      [nodes[node].count * schema.row_size] bytes: plane after plane, in the order of the
+ * schema threads  any */
+bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
+                                   mospt_err *err);

@@ -39,6 +39,5 @@ void mospt_err_text(const mospt_err *err, char *text, size_t size)
         snprintf(text, size, "%s%sbyte %" PRIu64 ": %s", file, colon, err->place, err->message);
     else if (err->place_kind == MOSPT_AT_LINE)
         snprintf(text, size, "%s%sline %" PRIu64 ": %s", file, colon, err->place, err->message);
-    else
-        snprintf(text, size, "%s%s%s", file, colon, err->message);
+    else snprintf(text, size, "%s%s%s", file, colon, err->message);
 }

@@ -1,7 +1,8 @@
 /* mospt/err.h - what went wrong, where, in one sentence.
  *
- * What can fail returns bool and takes a `mospt_err *` last; NULL means that details are not wanted. Whoever finds the
- * fault fills it, callers pass it on, and only the program's front door prints it, once. */
+ * What can fail returns bool and takes a `mospt_err *` last; NULL means that details are not
+ * wanted. Whoever finds the fault fills it, callers pass it on, and only the program's front door
+ * prints it, once. */
 #pragma once
 #include <stdbool.h>
 #include <stddef.h>
@@ -51,8 +52,9 @@ static inline mospt_where mospt_at_line(const char *file, uint64_t line)
     return (mospt_where){.file = file, .kind = MOSPT_AT_LINE, .place = line};
 }
 
-/* Fills `err` (where not NULL) and returns false, so that `return mospt_err_set(...)` fails in one line.
- * format   a sentence without file, place or final full stop; for MOSPT_EIO the system's words are appended from errno */
+/* Fills `err` (where not NULL) and returns false, so that `return mospt_err_set(...)` fails in one
+ * line. format   a sentence without file, place or final full stop; for MOSPT_EIO the system's
+ * words are appended from errno */
 bool mospt_err_set(mospt_err *err, mospt_code code, mospt_where where, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 

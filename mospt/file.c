@@ -15,7 +15,8 @@ static const size_t TRANSFER_MAX = (size_t)1 << 30;
 char *mospt_file_join(const char *folder, const char *name)
 {
     size_t a = strlen(folder), b = strlen(name);
-    while (a > 1 && folder[a - 1] == '/') a--;
+    while (a > 1 && folder[a - 1] == '/')
+        a--;
     char *path = malloc(a + b + 2);
     if (path == NULL) return NULL;
     memcpy(path, folder, a);
@@ -37,13 +38,15 @@ int mospt_file_open(const char *path, uint64_t *size, mospt_err *err)
     return fd;
 }
 
-bool mospt_file_read_at(int fd, const char *path, uint64_t offset, void *out, size_t size, mospt_err *err)
+bool mospt_file_read_at(int fd, const char *path, uint64_t offset, void *out, size_t size,
+                        mospt_err *err)
 {
     char *to = out;
     while (size > 0) {
         ssize_t n = pread(fd, to, size < TRANSFER_MAX ? size : TRANSFER_MAX, (off_t)offset);
         if (n < 0 && errno == EINTR) continue;
-        if (n < 0) return mospt_err_set(err, MOSPT_EIO, mospt_at_byte(path, offset), "cannot be read");
+        if (n < 0)
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_byte(path, offset), "cannot be read");
         if (n == 0)
             return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(path, offset),
                                  "the file ends here, %zu more bytes are missing", size);
@@ -66,7 +69,8 @@ bool mospt_file_write_at(int fd, const char *path, uint64_t offset, const void *
     return true;
 }
 
-bool mospt_file_read_whole(const char *path, size_t max_size, char **out, size_t *size, mospt_err *err)
+bool mospt_file_read_whole(const char *path, size_t max_size, char **out, size_t *size,
+                           mospt_err *err)
 {
     uint64_t file_size;
     char *bytes = NULL;
@@ -75,7 +79,8 @@ bool mospt_file_read_whole(const char *path, size_t max_size, char **out, size_t
     if (fd < 0) return false;
     if (file_size > max_size) {
         mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path),
-                      "has %llu bytes, at most %zu can be right", (unsigned long long)file_size, max_size);
+                      "has %llu bytes, at most %zu can be right", (unsigned long long)file_size,
+                      max_size);
         goto done;
     }
     bytes = malloc((size_t)file_size + 1);

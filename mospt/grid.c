@@ -3,19 +3,21 @@
 #include <math.h>
 #include <string.h>
 
-/* The root cube is put at an odd place of every second level above it (binary ...0101), so that growing by one level
- * makes room on one side of it and growing by two levels on both. */
+/* The root cube is put at an odd place of every second level above it (binary ...0101), so that
+ * growing by one level makes room on one side of it and growing by two levels on both. */
 static uint32_t root_corner(uint32_t bits)
 {
     uint64_t pattern = 0;
-    for (uint32_t bit = bits; bit + 1 < 32; bit += 2) pattern |= UINT64_C(1) << bit;
+    for (uint32_t bit = bits; bit + 1 < 32; bit += 2)
+        pattern |= UINT64_C(1) << bit;
     return (uint32_t)pattern;
 }
 
 static uint32_t bits_for(double steps)
 {
     uint32_t bits = 0;
-    while (bits < 40 && ldexp(1, (int)bits) <= steps) bits++;
+    while (bits < 40 && ldexp(1, (int)bits) <= steps)
+        bits++;
     return bits;
 }
 
@@ -42,14 +44,16 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
                                  "xyz"[a]);
         grid.offset[a] = offset != NULL ? offset[a] : 0;
         extent = fmax(extent, high[a] - low[a]);
-        largest = fmax(largest, fmax(fabs(low[a] - grid.offset[a]), fabs(high[a] - grid.offset[a])));
+        largest =
+            fmax(largest, fmax(fabs(low[a] - grid.offset[a]), fabs(high[a] - grid.offset[a])));
     }
     if (!isfinite(extent) || !isfinite(largest))
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), "bounds reach further than numbers do");
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "bounds reach further than numbers do");
     if (!(step > 0)) {
         step = extent > 0 ? ldexp(1, ilogb(extent) - 30) : 0;
-        /* A double holds 53 bits: a finer step than the last of them would only store noise. Points all at one position
-         * get that step, and points all at the origin any. */
+        /* A double holds 53 bits: a finer step than the last of them would only store noise. Points
+         * all at one position get that step, and points all at the origin any. */
         step = fmax(step, largest > 0 ? ldexp(1, (int)ceil(log2(largest)) - 53) : 0x1p-20);
         step = fmax(step, 0x1p-1000);
     }
@@ -58,12 +62,16 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
         if (bits > MOSPT_GRID_BITS_MAX) continue;
         if (!(largest / step < 0x1p62 - 0x1p33))
             return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                                 "coordinates up to %g need more than 2^62 steps of %g", largest, step);
-        /* Where steps are finer than a double can tell, rounding may put the far corner further out. */
+                                 "coordinates up to %g need more than 2^62 steps of %g", largest,
+                                 step);
+        /* Where steps are finer than a double can tell, rounding may put the far corner further
+         * out. */
         for (; bits <= MOSPT_GRID_BITS_MAX; bits++) {
             uint32_t unused[3];
             put_root(&grid, low, step, bits);
-            if (!mospt_grid_from_world(&grid, low, unused) || !mospt_grid_from_world(&grid, high, unused)) continue;
+            if (!mospt_grid_from_world(&grid, low, unused) ||
+                !mospt_grid_from_world(&grid, high, unused))
+                continue;
             *out = grid;
             return true;
         }
@@ -72,7 +80,8 @@ bool mospt_grid_make(const double low[3], const double high[3], double step, con
 
 bool mospt_grid_is_valid(const mospt_grid *grid)
 {
-    if (!(grid->step > 0) || !isfinite(grid->step) || grid->bits > MOSPT_GRID_BITS_MAX) return false;
+    if (!(grid->step > 0) || !isfinite(grid->step) || grid->bits > MOSPT_GRID_BITS_MAX)
+        return false;
     uint64_t width = UINT64_C(1) << grid->bits;
     for (int a = 0; a < 3; a++) {
         if (!isfinite(grid->offset[a])) return false;

@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* The text ends in a line with the checksum of all bytes before it, so that no byte of the file is unchecked. */
+/* The text ends in a line with the checksum of all bytes before it, so that no byte of the file is
+ * unchecked. */
 static const char TAIL_FORMAT[] = ",\n  \"checksum\": \"%016" PRIx64 "\"\n}\n";
 enum { TAIL_SIZE = 37, TEXT_SIZE_MAX = 1 << 30, VERSION = 1 };
 
@@ -16,9 +17,11 @@ void mospt_metadata_fini(mospt_metadata *m)
     for (uint32_t i = 0; i < m->source_count; i++) {
         mospt_source *s = &m->sources[i];
         free(s->name), free(s->scan), free(s->format), free(s->damage);
-        for (uint32_t r = 0; r < s->reason_count; r++) free(s->drop_reason[r]);
+        for (uint32_t r = 0; r < s->reason_count; r++)
+            free(s->drop_reason[r]);
     }
-    for (uint32_t i = 0; i < m->file_count; i++) free(m->files[i].name);
+    for (uint32_t i = 0; i < m->file_count; i++)
+        free(m->files[i].name);
     free(m->sources), free(m->files), free(m->crs);
     *m = (mospt_metadata){0};
 }
@@ -46,7 +49,8 @@ static json_t *hash_to_json(uint64_t hash)
 static json_t *reals_to_json(const double *values, size_t count)
 {
     json_t *array = json_array();
-    for (size_t i = 0; i < count; i++) json_array_append_new(array, json_real(values[i]));
+    for (size_t i = 0; i < count; i++)
+        json_array_append_new(array, json_real(values[i]));
     return array;
 }
 
@@ -63,8 +67,9 @@ static json_t *attributes_to_json(const mospt_schema *schema)
     json_t *array = json_array();
     for (uint32_t i = 0; i < schema->count; i++) {
         const mospt_attribute *a = &schema->at[i];
-        json_array_append_new(array, json_pack("{s:o, s:s, s:i}", "name", text_to_json(a->name), "type",
-                                               mospt_type_name(a->type), "components", (int)a->components));
+        json_array_append_new(array, json_pack("{s:o, s:s, s:i}", "name", text_to_json(a->name),
+                                               "type", mospt_type_name(a->type), "components",
+                                               (int)a->components));
     }
     return array;
 }
@@ -74,10 +79,10 @@ static json_t *source_to_json(const mospt_source *s)
     json_t *dropped = json_object();
     for (uint32_t r = 0; r < s->reason_count; r++)
         json_object_set_new(dropped, s->drop_reason[r], json_integer((json_int_t)s->drop_count[r]));
-    json_t *json = json_pack("{s:o, s:o, s:o, s:I, s:o, s:b, s:b}", "name", text_to_json(s->name), "scan",
-                             text_to_json(s->scan), "format", text_to_json(s->format), "points",
-                             (json_int_t)s->points, "dropped", dropped, "rgb", (int)s->has_rgb,
-                             "intensity", (int)s->has_intensity);
+    json_t *json = json_pack("{s:o, s:o, s:o, s:I, s:o, s:b, s:b}", "name", text_to_json(s->name),
+                             "scan", text_to_json(s->scan), "format", text_to_json(s->format),
+                             "points", (json_int_t)s->points, "dropped", dropped, "rgb",
+                             (int)s->has_rgb, "intensity", (int)s->has_intensity);
     if (json == NULL) return NULL;
     if (s->points > 0) {
         json_object_set_new(json, "min", reals_to_json(s->low, 3));
@@ -100,14 +105,14 @@ static json_t *metadata_to_json(const mospt_metadata *m)
                      "s:{s:s, s:I, s:o}, s:o, s:o}",
                      "format", "instantpoints dataset", "version", VERSION, "generation",
                      (json_int_t)m->generation, "points", (json_int_t)m->point_count, "points_hash",
-                     hash_to_json(m->points_hash), "position_error", m->position_error, "bounds", "min",
-                     reals_to_json(m->low, 3), "max", reals_to_json(m->high, 3), "grid",
-                     grid_to_json(&m->grid), "refinement", "additive", "inner_depth", (int)m->inner_depth,
-                     "add_threshold", (int)m->add_threshold, "crs",
+                     hash_to_json(m->points_hash), "position_error", m->position_error, "bounds",
+                     "min", reals_to_json(m->low, 3), "max", reals_to_json(m->high, 3), "grid",
+                     grid_to_json(&m->grid), "refinement", "additive", "inner_depth",
+                     (int)m->inner_depth, "add_threshold", (int)m->add_threshold, "crs",
                      text_to_json(m->crs != NULL ? m->crs : ""), "attributes",
                      attributes_to_json(&m->schema), "hierarchy", "file", m->hierarchy_name, "size",
-                     (json_int_t)m->hierarchy_size, "hash", hash_to_json(m->hierarchy_hash), "payloads",
-                     payloads, "sources", sources);
+                     (json_int_t)m->hierarchy_size, "hash", hash_to_json(m->hierarchy_hash),
+                     "payloads", payloads, "sources", sources);
 }
 
 bool mospt_metadata_write(const mospt_metadata *metadata, const char *dataset_path, mospt_err *err)
@@ -131,7 +136,8 @@ done:
     return ok;
 }
 
-/* What is read from; the first thing that is missing or of the wrong kind is remembered and the rest falls through. */
+/* What is read from; the first thing that is missing or of the wrong kind is remembered and the
+ * rest falls through. */
 typedef struct {
     const char *path;
     bool ok;
@@ -142,14 +148,16 @@ static json_t *get(parse *p, json_t *object, const char *key)
 {
     json_t *value = json_object_get(object, key);
     if (value == NULL && p->ok)
-        p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path), "\"%s\" is missing", key);
+        p->ok =
+            mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path), "\"%s\" is missing", key);
     return value;
 }
 
 static bool wrong(parse *p, const char *key)
 {
     if (p->ok)
-        p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path), "\"%s\" is not what it should be", key);
+        p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path),
+                              "\"%s\" is not what it should be", key);
     return false;
 }
 
@@ -224,14 +232,16 @@ static void schema_from_json(parse *p, json_t *array, mospt_schema *schema)
 {
     size_t i;
     json_t *item;
-    json_array_foreach (array, i, item) {
+    json_array_foreach(array, i, item)
+    {
         const char *name = json_string_value(get(p, item, "name"));
         const char *type_name = json_string_value(get(p, item, "type"));
         mospt_type type;
         uint32_t components = (uint32_t)get_integer(p, item, "components", 1, 255);
         if (!p->ok) return;
         if (name == NULL || type_name == NULL || !mospt_type_from_name(type_name, &type) ||
-            mospt_schema_find(schema, name) >= 0 || !mospt_schema_add(schema, name, type, components, NULL))
+            mospt_schema_find(schema, name) >= 0 ||
+            !mospt_schema_add(schema, name, type, components, NULL))
             wrong(p, "attributes");
     }
 }
@@ -250,7 +260,8 @@ static void source_from_json(parse *p, json_t *json, mospt_source *s)
     }
     const char *reason;
     json_t *value;
-    json_object_foreach (get(p, json, "dropped"), reason, value) {
+    json_object_foreach(get(p, json, "dropped"), reason, value)
+    {
         if (s->reason_count == 8 || !json_is_integer(value) || json_integer_value(value) < 0) {
             wrong(p, "dropped");
             return;
@@ -290,13 +301,15 @@ static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
 {
     const char *format = json_string_value(json_object_get(json, "format"));
     if (format == NULL || strcmp(format, "instantpoints dataset") != 0) {
-        p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path), "is not that of a dataset");
+        p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path),
+                              "is not that of a dataset");
         return;
     }
     json_int_t version = json_integer_value(json_object_get(json, "version"));
     if (version != VERSION) {
         p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path),
-                              "has version %lld, this program reads version %d", (long long)version, VERSION);
+                              "has version %lld, this program reads version %d", (long long)version,
+                              VERSION);
         return;
     }
     json_t *bounds = get(p, json, "bounds"), *hierarchy = get(p, json, "hierarchy");
@@ -309,12 +322,14 @@ static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
     get_reals(p, bounds, "min", m->low, 3);
     get_reals(p, bounds, "max", m->high, 3);
     grid_from_json(p, get(p, json, "grid"), &m->grid);
-    m->inner_depth = (uint32_t)get_integer(p, json, "inner_depth", MOSPT_DEPTH_MIN, MOSPT_DEPTH_MAX);
+    m->inner_depth =
+        (uint32_t)get_integer(p, json, "inner_depth", MOSPT_DEPTH_MIN, MOSPT_DEPTH_MAX);
     m->add_threshold = (uint32_t)get_integer(p, json, "add_threshold", 0, INT32_MAX);
     m->crs = get_text(p, json, "crs");
     schema_from_json(p, get(p, json, "attributes"), &m->schema);
     const char *name = json_string_value(get(p, hierarchy, "file"));
-    if (name == NULL || strchr(name, '/') != NULL || strlen(name) >= sizeof m->hierarchy_name) wrong(p, "file");
+    if (name == NULL || strchr(name, '/') != NULL || strlen(name) >= sizeof m->hierarchy_name)
+        wrong(p, "file");
     else snprintf(m->hierarchy_name, sizeof m->hierarchy_name, "%s", name);
     m->hierarchy_size = (uint64_t)get_integer(p, hierarchy, "size", 0, INT64_MAX);
     m->hierarchy_hash = get_hash(p, hierarchy, "hash");
@@ -346,7 +361,8 @@ bool mospt_metadata_read(const char *dataset_path, mospt_metadata *out, mospt_er
     if (!mospt_file_read_whole(path, TEXT_SIZE_MAX, &text, &size, err)) goto done;
     json = json_loadb(text, size, JSON_REJECT_DUPLICATES, &at);
     if (json == NULL) {
-        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(path, at.line > 0 ? (uint64_t)at.line : 1), "%s", at.text);
+        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(path, at.line > 0 ? (uint64_t)at.line : 1),
+                      "%s", at.text);
         goto done;
     }
     if (!tail_is_right(text, size)) {

@@ -10,22 +10,28 @@ static void copy_strided(uint8_t *to, size_t to_stride, const uint8_t *from, siz
 {
     switch (size) { /* a constant size makes each copy one load and one store */
     case 1:
-        for (uint32_t i = 0; i < count; i++) to[i * to_stride] = from[i * from_stride];
+        for (uint32_t i = 0; i < count; i++)
+            to[i * to_stride] = from[i * from_stride];
         return;
     case 2:
-        for (uint32_t i = 0; i < count; i++) memcpy(to + i * to_stride, from + i * from_stride, 2);
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(to + i * to_stride, from + i * from_stride, 2);
         return;
     case 4:
-        for (uint32_t i = 0; i < count; i++) memcpy(to + i * to_stride, from + i * from_stride, 4);
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(to + i * to_stride, from + i * from_stride, 4);
         return;
     case 8:
-        for (uint32_t i = 0; i < count; i++) memcpy(to + i * to_stride, from + i * from_stride, 8);
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(to + i * to_stride, from + i * from_stride, 8);
         return;
     case 16:
-        for (uint32_t i = 0; i < count; i++) memcpy(to + i * to_stride, from + i * from_stride, 16);
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(to + i * to_stride, from + i * from_stride, 16);
         return;
     default:
-        for (uint32_t i = 0; i < count; i++) memcpy(to + i * to_stride, from + i * from_stride, size);
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(to + i * to_stride, from + i * from_stride, size);
     }
 }
 
@@ -37,13 +43,15 @@ void mospt_payload_pack(const mospt_schema *schema, const uint8_t *records, cons
     for (uint32_t start = 0; start < count; start += BLOCK) {
         uint32_t n = count - start < BLOCK ? count - start : BLOCK;
         for (uint32_t i = start; i < start + n; i++)
-            memcpy(out + (size_t)i * sizeof(mospt_vertex), records + order[i] * stride, sizeof(mospt_vertex));
+            memcpy(out + (size_t)i * sizeof(mospt_vertex), records + order[i] * stride,
+                   sizeof(mospt_vertex));
         for (uint32_t k = 0; k < schema->count; k++) {
             const mospt_attribute *a = &schema->at[k];
             size_t size = mospt_attribute_size(a);
             uint8_t *plane = planes + (size_t)count * a->offset;
             const uint8_t *from = records + sizeof(mospt_vertex) + a->offset;
-            for (uint32_t i = start; i < start + n; i++) /* gathers: the stride of `from` is no constant */
+            for (uint32_t i = start; i < start + n;
+                 i++) /* gathers: the stride of `from` is no constant */
                 copy_strided(plane + i * size, size, from + order[i] * stride, stride, size, 1);
         }
     }
@@ -54,8 +62,8 @@ void mospt_payload_pack(const mospt_schema *schema, const uint8_t *records, cons
     node->attributes_hash = mospt_hash(planes, (size_t)count * schema->row_size);
 }
 
-uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices, const uint8_t *planes,
-                                   uint32_t count)
+uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices,
+                                   const uint8_t *planes, uint32_t count)
 {
     uint8_t records[2 * MOSPT_ROW_SIZE_MAX];
     size_t stride = mospt_record_size(schema);

@@ -1,4 +1,5 @@
-/* mospt/payload.h - the bytes of one node: its vertices as the GPU wants them, then one plane per attribute. */
+/* mospt/payload.h - the bytes of one node: its vertices as the GPU wants them, then one plane per
+ * attribute. */
 #pragma once
 #include "mospt/hierarchy.h"
 #include "mospt/point.h"
@@ -10,13 +11,13 @@ static inline size_t mospt_record_size(const mospt_schema *schema)
     return sizeof(mospt_vertex) + schema->row_size;
 }
 
-/* Packs the records order[0..count-1] of `records` into `out`, and sets the size and the hashes of `node`.
- * records  [..][mospt_record_size()] vertex and row of each point
- * out      [count * mospt_record_size()] */
+/* Packs the records order[0..count-1] of `records` into `out`, and sets the size and the hashes of
+ * `node`. records  [..][mospt_record_size()] vertex and row of each point out      [count *
+ * mospt_record_size()] */
 void mospt_payload_pack(const mospt_schema *schema, const uint8_t *records, const uint32_t *order,
                         uint32_t count, uint8_t *out, mospt_node *node);
 
 /* Sum of the hashes of the points in a payload, each as mospt_hash_records() sees its record.
  * vertices [count], planes [count * row_size] bytes as they are stored */
-uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices, const uint8_t *planes,
-                                   uint32_t count);
+uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices,
+                                   const uint8_t *planes, uint32_t count);

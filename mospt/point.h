@@ -1,6 +1,7 @@
 /* mospt/point.h - one point as the GPU, the file and the builder hold it.
  *
- * A vertex is 16 bytes; a record is a vertex followed by the point's attributes, one packed row (see mospt/schema.h). */
+ * A vertex is 16 bytes; a record is a vertex followed by the point's attributes, one packed row
+ * (see mospt/schema.h). */
 #pragma once
 #include <stdint.h>
 #include <string.h>

@@ -55,31 +55,53 @@ mospt_type mospt_type_common(mospt_type a, mospt_type b)
     mospt_type with_sign = types[a].is_signed ? a : b, without = types[a].is_signed ? b : a;
     if (types[with_sign].size > types[without].size) return with_sign;
     switch (types[without].size) {
-    case 1: return MOSPT_I16;
-    case 2: return MOSPT_I32;
-    case 4: return MOSPT_I64;
-    default: return MOSPT_F64;
+    case 1:
+        return MOSPT_I16;
+    case 2:
+        return MOSPT_I32;
+    case 4:
+        return MOSPT_I64;
+    default:
+        return MOSPT_F64;
     }
 }
 
 double mospt_type_read(mospt_type type, const void *value)
 {
     union {
-        uint8_t u8; int8_t i8; uint16_t u16; int16_t i16; uint32_t u32; int32_t i32;
-        uint64_t u64; int64_t i64; float f32; double f64;
+        uint8_t u8;
+        int8_t i8;
+        uint16_t u16;
+        int16_t i16;
+        uint32_t u32;
+        int32_t i32;
+        uint64_t u64;
+        int64_t i64;
+        float f32;
+        double f64;
     } v;
     memcpy(&v, value, types[type].size);
     switch (type) {
-    case MOSPT_U8: return v.u8;
-    case MOSPT_I8: return v.i8;
-    case MOSPT_U16: return v.u16;
-    case MOSPT_I16: return v.i16;
-    case MOSPT_U32: return v.u32;
-    case MOSPT_I32: return v.i32;
-    case MOSPT_U64: return (double)v.u64;
-    case MOSPT_I64: return (double)v.i64;
-    case MOSPT_F32: return (double)v.f32;
-    default: return v.f64;
+    case MOSPT_U8:
+        return v.u8;
+    case MOSPT_I8:
+        return v.i8;
+    case MOSPT_U16:
+        return v.u16;
+    case MOSPT_I16:
+        return v.i16;
+    case MOSPT_U32:
+        return v.u32;
+    case MOSPT_I32:
+        return v.i32;
+    case MOSPT_U64:
+        return (double)v.u64;
+    case MOSPT_I64:
+        return (double)v.i64;
+    case MOSPT_F32:
+        return (double)v.f32;
+    default:
+        return v.f64;
     }
 }
 
@@ -93,13 +115,21 @@ static double clamp_round(double value, double low, double high)
 void mospt_type_write(mospt_type type, double value, void *out)
 {
     switch (type) {
-    case MOSPT_U8: *(uint8_t *)out = (uint8_t)clamp_round(value, 0, UINT8_MAX); return;
-    case MOSPT_I8: *(int8_t *)out = (int8_t)clamp_round(value, INT8_MIN, INT8_MAX); return;
-    case MOSPT_U16: memcpy(out, &(uint16_t){(uint16_t)clamp_round(value, 0, UINT16_MAX)}, 2); return;
+    case MOSPT_U8:
+        *(uint8_t *)out = (uint8_t)clamp_round(value, 0, UINT8_MAX);
+        return;
+    case MOSPT_I8:
+        *(int8_t *)out = (int8_t)clamp_round(value, INT8_MIN, INT8_MAX);
+        return;
+    case MOSPT_U16:
+        memcpy(out, &(uint16_t){(uint16_t)clamp_round(value, 0, UINT16_MAX)}, 2);
+        return;
     case MOSPT_I16:
         memcpy(out, &(int16_t){(int16_t)clamp_round(value, INT16_MIN, INT16_MAX)}, 2);
         return;
-    case MOSPT_U32: memcpy(out, &(uint32_t){(uint32_t)clamp_round(value, 0, UINT32_MAX)}, 4); return;
+    case MOSPT_U32:
+        memcpy(out, &(uint32_t){(uint32_t)clamp_round(value, 0, UINT32_MAX)}, 4);
+        return;
     case MOSPT_I32:
         memcpy(out, &(int32_t){(int32_t)clamp_round(value, INT32_MIN, INT32_MAX)}, 4);
         return;
@@ -113,8 +143,12 @@ void mospt_type_write(mospt_type type, double value, void *out)
         memcpy(out, &v, 8);
         return;
     }
-    case MOSPT_F32: memcpy(out, &(float){(float)value}, 4); return;
-    default: memcpy(out, &value, 8); return;
+    case MOSPT_F32:
+        memcpy(out, &(float){(float)value}, 4);
+        return;
+    default:
+        memcpy(out, &value, 8);
+        return;
     }
 }
 
@@ -137,8 +171,8 @@ static void lay_out(mospt_schema *schema)
 static bool row_is_too_wide(const char *name, mospt_err *err)
 {
     return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                         "more than %d bytes of attributes per point, the first one too many is %s", MOSPT_ROW_SIZE_MAX,
-                         name);
+                         "more than %d bytes of attributes per point, the first one too many is %s",
+                         MOSPT_ROW_SIZE_MAX, name);
 }
 
 bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, uint32_t components,
@@ -162,8 +196,8 @@ bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, u
                                  MOSPT_ATTRIBUTES_MAX, name);
         if (components < 1 || components > 255)
             return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                                 "attribute %s has %u values per point, 1 to 255 are possible", name,
-                                 components);
+                                 "attribute %s has %u values per point, 1 to 255 are possible",
+                                 name, components);
         if (schema->row_size + mospt_type_size(type) * components > MOSPT_ROW_SIZE_MAX)
             return row_is_too_wide(name, err);
         mospt_attribute *a = &schema->at[schema->count++];

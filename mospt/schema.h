@@ -1,15 +1,25 @@
-/* mospt/schema.h - which attributes every point of a scan or a dataset carries besides position and display colour.
+/* mospt/schema.h - which attributes every point of a scan or a dataset carries besides position and
+ * display colour.
  *
- * Names are those of the field: intensity, rgb (raw 16-bit colour), classification, return_number, number_of_returns,
- * flags, scan_angle, user_data, point_source, gps_time, nir, normal, scan (index into the dataset's sources); anything
- * else keeps the name that its file gives it. */
+ * Names are those of the field: intensity, rgb (raw 16-bit colour), classification, return_number,
+ * number_of_returns, flags, scan_angle, user_data, point_source, gps_time, nir, normal, scan (index
+ * into the dataset's sources); anything else keeps the name that its file gives it. */
 #pragma once
 #include "mospt/err.h"
 
 enum { MOSPT_ATTRIBUTES_MAX = 64, MOSPT_ATTRIBUTE_NAME_MAX = 48, MOSPT_ROW_SIZE_MAX = 16384 };
 
 typedef enum {
-    MOSPT_U8, MOSPT_I8, MOSPT_U16, MOSPT_I16, MOSPT_U32, MOSPT_I32, MOSPT_U64, MOSPT_I64, MOSPT_F32, MOSPT_F64,
+    MOSPT_U8,
+    MOSPT_I8,
+    MOSPT_U16,
+    MOSPT_I16,
+    MOSPT_U32,
+    MOSPT_I32,
+    MOSPT_U64,
+    MOSPT_I64,
+    MOSPT_F32,
+    MOSPT_F64,
     MOSPT_TYPE_COUNT,
 } mospt_type;
 
@@ -30,7 +40,8 @@ size_t mospt_type_size(mospt_type type);
 const char *mospt_type_name(mospt_type type); /* "u8" ... "f64" */
 bool mospt_type_from_name(const char *name, mospt_type *out);
 
-/* The narrowest type that holds every value of both, as far as any does (u64 and i64 meet in f64). */
+/* The narrowest type that holds every value of both, as far as any does (u64 and i64 meet in f64).
+ */
 mospt_type mospt_type_common(mospt_type a, mospt_type b);
 
 /* Value of one component at `value`, whatever its type. */
@@ -48,6 +59,7 @@ static inline size_t mospt_attribute_size(const mospt_attribute *a)
 int mospt_schema_find(const mospt_schema *schema, const char *name);
 
 /* Appends an attribute, or widens the type of the one that has this name already.
- * errors   MOSPT_EINVAL: too many attributes, or bytes in a row, or the same name with another number of components */
+ * errors   MOSPT_EINVAL: too many attributes, or bytes in a row, or the same name with another
+ * number of components */
 bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, uint32_t components,
                       mospt_err *err);

@@ -26,7 +26,8 @@ bool mospt_survey_tree(const mospt_dataset *d, mospt_tree_figures *out, mospt_er
         if (n->child_count > 0) parents++;
         if (n->count > n->level_end[h->inner_depth]) f.added++;
         if (n->level + 1u > f.levels) f.levels = n->level + 1u;
-        for (uint32_t l = 0; l < h->inner_depth; l++) cells_above += n->level_end[l], cells_below += n->level_end[l + 1];
+        for (uint32_t l = 0; l < h->inner_depth; l++)
+            cells_above += n->level_end[l], cells_below += n->level_end[l + 1];
     }
     qsort(counts, h->count, sizeof *counts, compare_counts);
     f.leaves = h->count - (uint32_t)parents;
@@ -107,32 +108,38 @@ static void sort_codes(uint32_t *codes, uint32_t *spare, size_t count)
 {
     for (uint32_t shift = 0; shift < 27; shift += 9) {
         size_t place_of[512] = {0};
-        for (size_t i = 0; i < count; i++) place_of[codes[i] >> shift & 511]++;
+        for (size_t i = 0; i < count; i++)
+            place_of[codes[i] >> shift & 511]++;
         for (size_t v = 0, at = 0; v < 512; v++) {
             size_t n = place_of[v];
             place_of[v] = at;
             at += n;
         }
-        for (size_t i = 0; i < count; i++) spare[place_of[codes[i] >> shift & 511]++] = codes[i];
+        for (size_t i = 0; i < count; i++)
+            spare[place_of[codes[i] >> shift & 511]++] = codes[i];
         uint32_t *swap = codes;
         codes = spare, spare = swap;
     }
     memcpy(spare, codes, count * sizeof *codes); /* three turns end in the other array */
 }
 
-/* Cells from depth 1 to the one above the finest that hold at least two of the points, all of one octant. */
-static bool count_interior(surveyor *s, const uint32_t corner_bits, const place *places, size_t count, mospt_err *err)
+/* Cells from depth 1 to the one above the finest that hold at least two of the points, all of one
+ * octant. */
+static bool count_interior(surveyor *s, const uint32_t corner_bits, const place *places,
+                           size_t count, mospt_err *err)
 {
     uint32_t depth = s->dataset->hierarchy.inner_depth;
     uint32_t *codes = malloc(2 * count * sizeof *codes + 1);
     if (codes == NULL) return mospt_err_nomem(err, 2 * count * sizeof *codes);
     for (size_t i = 0; i < count; i++)
-        codes[i] = (uint32_t)mospt_cell_code(places[i].at[0], places[i].at[1], places[i].at[2], corner_bits, depth);
+        codes[i] = (uint32_t)mospt_cell_code(places[i].at[0], places[i].at[1], places[i].at[2],
+                                             corner_bits, depth);
     sort_codes(codes, codes + count, count);
     for (uint32_t d = 1; d < depth; d++) {
         uint32_t shift = 3 * (depth - d);
         for (size_t a = 0, b; a < count; a = b) {
-            for (b = a + 1; b < count && codes[b] >> shift == codes[a] >> shift;) b++;
+            for (b = a + 1; b < count && codes[b] >> shift == codes[a] >> shift;)
+                b++;
             if (b - a > 1) s->spt->interior++;
         }
     }
@@ -141,9 +148,11 @@ static bool count_interior(surveyor *s, const uint32_t corner_bits, const place 
 }
 
 /* Visits a node with all points of its ancestors that lie in it. */
-static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_count, mospt_err *err);
+static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_count,
+                  mospt_err *err);
 
-static bool visit_octants(surveyor *s, uint32_t node, const place *places, size_t count, mospt_err *err)
+static bool visit_octants(surveyor *s, uint32_t node, const place *places, size_t count,
+                          mospt_err *err)
 {
     const mospt_hierarchy *h = &s->dataset->hierarchy;
     uint32_t bits = mospt_cell_bits(&s->dataset->metadata.grid, h->nodes[node].level);
@@ -154,21 +163,25 @@ static bool visit_octants(surveyor *s, uint32_t node, const place *places, size_
         size_t n = 0;
         if (inside == NULL) return mospt_err_nomem(err, count * sizeof *inside);
         for (size_t i = 0; i < count; i++)
-            if (mospt_cell_code(places[i].at[0], places[i].at[1], places[i].at[2], bits, 1) == o) inside[n++] = places[i];
+            if (mospt_cell_code(places[i].at[0], places[i].at[1], places[i].at[2], bits, 1) == o)
+                inside[n++] = places[i];
         place *shrunk = realloc(inside, n * sizeof *inside + 1);
         if (shrunk != NULL) inside = shrunk;
         uint32_t child = mospt_hierarchy_child(h, node, o);
-        ok = child != MOSPT_NO_NODE ? visit(s, child, inside, n, err) : count_interior(s, bits, inside, n, err);
+        ok = child != MOSPT_NO_NODE ? visit(s, child, inside, n, err)
+                                    : count_interior(s, bits, inside, n, err);
         free(inside);
     }
     return ok;
 }
 
-static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_count, mospt_err *err)
+static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_count,
+                  mospt_err *err)
 {
     const mospt_dataset *d = s->dataset;
     uint32_t count = d->hierarchy.nodes[node].count;
-    size_t vertices_size = mospt_dataset_vertices_size(d, node), row_size = d->metadata.schema.row_size;
+    size_t vertices_size = mospt_dataset_vertices_size(d, node),
+           row_size = d->metadata.schema.row_size;
     bool ok = false;
     mospt_vertex *v = malloc(vertices_size);
     uint8_t *planes = malloc(count * row_size + 1);
@@ -185,7 +198,8 @@ static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_c
     }
     add_places(s, count, v);
     if (above_count > 0) memcpy(places, above, above_count * sizeof *places);
-    for (uint32_t i = 0; i < count; i++) places[above_count + i] = (place){{v[i].x, v[i].y, v[i].z}};
+    for (uint32_t i = 0; i < count; i++)
+        places[above_count + i] = (place){{v[i].x, v[i].y, v[i].z}};
     free(v), free(planes);
     v = NULL, planes = NULL;
     ok = visit_octants(s, node, places, above_count + count, err);
@@ -209,13 +223,18 @@ static void finish_points(surveyor *s)
     }
     f->has_rgb = s->rgb_count > 0;
     for (uint32_t k = 0; k < m->schema.count; k++)
-        for (int c = 0; c < COMPONENTS; c++) f->attribute_mean[k][c] = s->attribute_sum[k][c] / n;
+        for (int c = 0; c < COMPONENTS; c++)
+            f->attribute_mean[k][c] = s->attribute_sum[k][c] / n;
 }
 
-bool mospt_survey_points(const mospt_dataset *d, mospt_point_figures *points, mospt_spt_figures *spt, mospt_err *err)
+bool mospt_survey_points(const mospt_dataset *d, mospt_point_figures *points,
+                         mospt_spt_figures *spt, mospt_err *err)
 {
     mospt_spt_figures unused = {0}, *figures = spt != NULL ? spt : &unused;
-    surveyor s = {.dataset = d, .points = points, .spt = figures, .low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
+    surveyor s = {.dataset = d,
+                  .points = points,
+                  .spt = figures,
+                  .low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
     *figures = (mospt_spt_figures){.points = d->metadata.point_count};
     if (points != NULL) {
         *points = (mospt_point_figures){0};
@@ -227,6 +246,7 @@ bool mospt_survey_points(const mospt_dataset *d, mospt_point_figures *points, mo
     if (points != NULL) finish_points(&s);
     figures->classic_bytes = (figures->points + figures->interior) * MOSPT_SPT_POINT_SIZE;
     figures->mospt_bytes = figures->points * sizeof(mospt_vertex);
-    figures->branching = figures->interior > 0 ? 1 + (double)figures->points / (double)figures->interior : 0;
+    figures->branching =
+        figures->interior > 0 ? 1 + (double)figures->points / (double)figures->interior : 0;
     return true;
 }

@@ -1,16 +1,17 @@
-/* mospt/survey.h - figures about a dataset: those of its tree, and those that take reading every point. */
+/* mospt/survey.h - figures about a dataset: those of its tree, and those that take reading every
+ * point. */
 #pragma once
 #include "mospt/dataset.h"
 
 /* What the hierarchy alone tells. */
 typedef struct {
     uint32_t nodes, leaves;
-    uint32_t levels;           /* of the outer octree */
+    uint32_t levels;                                /* of the outer octree */
     uint32_t points_min, points_median, points_max; /* of a MOSPT */
     double points_mean;
-    double branching;          /* children of a node of the outer octree that has any */
-    double cell_branching;     /* occupied children of an occupied cell inside a MOSPT */
-    uint32_t added;            /* nodes in which an octant adds */
+    double branching;      /* children of a node of the outer octree that has any */
+    double cell_branching; /* occupied children of an occupied cell inside a MOSPT */
+    uint32_t added;        /* nodes in which an octant adds */
 } mospt_tree_figures;
 
 bool mospt_survey_tree(const mospt_dataset *dataset, mospt_tree_figures *out, mospt_err *err);
@@ -25,8 +26,9 @@ typedef struct {
     double attribute_mean[MOSPT_ATTRIBUTES_MAX][3];
 } mospt_point_figures;
 
-/* Memory of a classic sequential point tree of the same points (Wimmer & Scheiblauer 2006, section 4.3) in the octree that
- * the dataset has: it stores an additional point for each interior node, and r_min and r_max with every point. */
+/* Memory of a classic sequential point tree of the same points (Wimmer & Scheiblauer 2006,
+ * section 4.3) in the octree that the dataset has: it stores an additional point for each interior
+ * node, and r_min and r_max with every point. */
 typedef struct {
     uint64_t points;
     uint64_t interior; /* cells with at least two points below them, down to the finest ones */
@@ -39,5 +41,5 @@ enum { MOSPT_SPT_POINT_SIZE = 24 }; /* position, colour, r_min, r_max */
 /* Reads every point, node after node.
  * points   out, may be NULL: then no attributes are read
  * spt      out, may be NULL */
-bool mospt_survey_points(const mospt_dataset *dataset, mospt_point_figures *points, mospt_spt_figures *spt,
-                         mospt_err *err);
+bool mospt_survey_points(const mospt_dataset *dataset, mospt_point_figures *points,
+                         mospt_spt_figures *spt, mospt_err *err);

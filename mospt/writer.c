@@ -36,16 +36,20 @@ static bool is_ours(const char *name)
     }
     if (sscanf(name, "hierarchy-%u", &number) != 1) return false;
     int length = snprintf(same, sizeof same, "hierarchy-%06u.bin", number);
-    return strncmp(name, same, (size_t)length) == 0 && (name[length] == '\0' || strcmp(name + length, ".new") == 0);
+    return strncmp(name, same, (size_t)length) == 0 &&
+           (name[length] == '\0' || strcmp(name + length, ".new") == 0);
 }
 
 /* Calls for what a folder holds beside "." and ".."; the first false ends it. */
-static bool each_entry(const char *path, bool (*visit)(int folder, const char *path, const char *name, mospt_err *err),
+static bool each_entry(const char *path,
+                       bool (*visit)(int folder, const char *path, const char *name,
+                                     mospt_err *err),
                        mospt_err *err)
 {
     bool ok = true;
     DIR *folder = opendir(path);
-    if (folder == NULL) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be listed");
+    if (folder == NULL)
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be listed");
     for (struct dirent *entry; ok && (entry = readdir(folder)) != NULL;)
         if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
             ok = visit(dirfd(folder), path, entry->d_name, err);
@@ -58,7 +62,8 @@ static bool refuse_others(int folder, const char *path, const char *name, mospt_
     (void)folder;
     if (is_ours(name)) return true;
     return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
-                         "is a folder with other things in it (%s), not a place for a dataset", name);
+                         "is a folder with other things in it (%s), not a place for a dataset",
+                         name);
 }
 
 static bool remove_ours(int folder, const char *path, const char *name, mospt_err *err)
@@ -72,9 +77,11 @@ bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **
     if (mospt_dataset_exists(path))
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "is a dataset already");
     if (mkdir(path, 0777) != 0) {
-        if (errno != EEXIST) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
+        if (errno != EEXIST)
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
         /* Nothing is removed before all has been looked at. */
-        if (!each_entry(path, refuse_others, err) || !each_entry(path, remove_ours, err)) return false;
+        if (!each_entry(path, refuse_others, err) || !each_entry(path, remove_ours, err))
+            return false;
     }
     mospt_writer *w = calloc(1, sizeof *w);
     if (w == NULL) return mospt_err_nomem(err, sizeof *w);
@@ -102,7 +109,8 @@ static bool add_file(mospt_writer *w, mospt_err *err)
     return fd >= 0;
 }
 
-bool mospt_writer_append(mospt_writer *w, const mospt_node *node, const uint8_t *payload, mospt_err *err)
+bool mospt_writer_append(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
+                         mospt_err *err)
 {
     uint32_t file = node->level < FILES_MAX ? node->level : FILES_MAX - 1;
     while (w->file_count <= file)
@@ -114,7 +122,8 @@ bool mospt_writer_append(mospt_writer *w, const mospt_node *node, const uint8_t 
         w->hierarchy.nodes = nodes;
         w->capacity = capacity;
     }
-    if (!mospt_file_write_at(w->fd[file], w->path, w->size[file], payload, (size_t)node->payload_size, err))
+    if (!mospt_file_write_at(w->fd[file], w->path, w->size[file], payload,
+                             (size_t)node->payload_size, err))
         return false;
     mospt_node *copy = &w->hierarchy.nodes[w->hierarchy.count++];
     *copy = *node;
@@ -146,7 +155,8 @@ bool mospt_writer_commit(mospt_writer *w, mospt_metadata *m, mospt_err *err)
         m->files[m->file_count].name = strdup(name);
         if (m->files[m->file_count].name == NULL) return mospt_err_nomem(err, sizeof name);
         if (fsync(w->fd[m->file_count]) != 0)
-            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path), "%s cannot be flushed to the disk", name);
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
+                                 "%s cannot be flushed to the disk", name);
     }
     if (!mospt_hierarchy_link(&w->hierarchy, &m->grid, err)) return false;
     m->generation = 1;
@@ -155,8 +165,9 @@ bool mospt_writer_commit(mospt_writer *w, mospt_metadata *m, mospt_err *err)
     snprintf(m->hierarchy_name, sizeof m->hierarchy_name, "hierarchy-%06u.bin", 1u);
     char *path = mospt_file_join(w->path, m->hierarchy_name);
     if (path == NULL) return mospt_err_nomem(err, strlen(w->path));
-    bool ok = mospt_hierarchy_write(&w->hierarchy, path, &m->hierarchy_size, &m->hierarchy_hash, err) &&
-              mospt_metadata_write(m, w->path, err);
+    bool ok =
+        mospt_hierarchy_write(&w->hierarchy, path, &m->hierarchy_size, &m->hierarchy_hash, err) &&
+        mospt_metadata_write(m, w->path, err);
     free(path);
     w->committed = ok;
     return ok;
@@ -165,7 +176,8 @@ bool mospt_writer_commit(mospt_writer *w, mospt_metadata *m, mospt_err *err)
 void mospt_writer_destroy(mospt_writer *w)
 {
     if (w == NULL) return;
-    for (uint32_t i = 0; i < w->file_count; i++) close(w->fd[i]);
+    for (uint32_t i = 0; i < w->file_count; i++)
+        close(w->fd[i]);
     if (!w->committed && each_entry(w->path, remove_ours, NULL)) rmdir(w->path);
     mospt_hierarchy_fini(&w->hierarchy);
     free(w->path);

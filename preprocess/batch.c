@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t capacity, mospt_err *err)
+bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t capacity,
+                     mospt_err *err)
 {
     prep_batch b = {.capacity = capacity, .plane_count = schema->count};
     bool ok = true;
@@ -27,7 +28,8 @@ void prep_batch_fini(prep_batch *batch)
 {
     free(batch->xyz);
     free(batch->rgbi);
-    for (uint32_t k = 0; k < batch->plane_count; k++) free(batch->plane[k]);
+    for (uint32_t k = 0; k < batch->plane_count; k++)
+        free(batch->plane[k]);
     *batch = (prep_batch){0};
 }
 
@@ -37,7 +39,8 @@ void prep_batch_compact(prep_batch *batch, const uint8_t *keep)
     for (uint32_t i = 0; i < batch->count; i++) {
         if (!keep[i]) continue;
         if (out != i) {
-            memcpy(batch->xyz + 3 * (size_t)out, batch->xyz + 3 * (size_t)i, 3 * sizeof *batch->xyz);
+            memcpy(batch->xyz + 3 * (size_t)out, batch->xyz + 3 * (size_t)i,
+                   3 * sizeof *batch->xyz);
             memcpy(batch->rgbi + 4 * (size_t)out, batch->rgbi + 4 * (size_t)i, 4);
             for (uint32_t k = 0; k < batch->plane_count; k++) {
                 size_t s = batch->plane_size[k];

@@ -30,11 +30,11 @@ typedef struct {
     mospt_writer *writer;
     prep_written written;
     prep_phase phase;
-    uint64_t points_total;    /* 0: unknown */
+    uint64_t points_total; /* 0: unknown */
     double phase_start;
-    char *scratch_folder;     /* owned */
-    char *target;             /* owned: the folder written to */
-    char *replaced;           /* owned: the dataset whose place it takes at the end; NULL: none */
+    char *scratch_folder; /* owned */
+    char *target;         /* owned: the folder written to */
+    char *replaced;       /* owned: the dataset whose place it takes at the end; NULL: none */
 } build;
 
 const char *prep_phase_name(prep_phase phase)
@@ -61,12 +61,15 @@ static void enter(build *b, prep_phase phase)
 static bool tell(build *b, uint64_t points)
 {
     if (b->options->progress == NULL) return true;
-    prep_progress p = {.phase = b->phase, .points = points, .points_total = b->points_total, .share = -1};
-    p.scratch_bytes = b->store != NULL ? prep_store_scratch_peak(b->store) : b->result->source.spool_size;
+    prep_progress p = {
+        .phase = b->phase, .points = points, .points_total = b->points_total, .share = -1};
+    p.scratch_bytes =
+        b->store != NULL ? prep_store_scratch_peak(b->store) : b->result->source.spool_size;
     /* Of the time, reading takes about a quarter: measured on sites of 1 to 10 million points. */
     double before = b->phase == PREP_PHASE_WRITE ? 0.25 : 0;
     if (b->points_total > 0 && b->phase != PREP_PHASE_MEASURE)
-        p.share = before + (b->phase == PREP_PHASE_WRITE ? 0.75 : 0.25) * (double)points / (double)b->points_total;
+        p.share = before + (b->phase == PREP_PHASE_WRITE ? 0.75 : 0.25) * (double)points /
+                               (double)b->points_total;
     return b->options->progress(b->options->context, &p);
 }
 
@@ -86,7 +89,8 @@ static char *folder_of(const char *path)
     char *folder = strdup(path);
     if (folder == NULL) return NULL;
     size_t n = strlen(folder);
-    while (n > 1 && folder[n - 1] == '/') folder[--n] = '\0';
+    while (n > 1 && folder[n - 1] == '/')
+        folder[--n] = '\0';
     char *slash = strrchr(folder, '/');
     if (slash == folder) folder[1] = '\0';
     else if (slash != NULL) *slash = '\0';
@@ -95,23 +99,28 @@ static char *folder_of(const char *path)
     return folder;
 }
 
-/* Where the dataset is written: the output itself, or beside it where that is to be replaced at the end. */
+/* Where the dataset is written: the output itself, or beside it where that is to be replaced at the
+ * end. */
 static bool choose_folders(build *b, mospt_err *err)
 {
     const prep_build_options *o = b->options;
     size_t n = strlen(o->output);
-    while (n > 1 && o->output[n - 1] == '/') n--;
+    while (n > 1 && o->output[n - 1] == '/')
+        n--;
     if (mospt_dataset_exists(o->output) && !o->force)
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output), "is a dataset already; --force replaces it");
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output),
+                             "is a dataset already; --force replaces it");
     bool replaces = mospt_dataset_exists(o->output);
     b->target = malloc(n + sizeof BESIDE);
     b->replaced = replaces ? strndup(o->output, n) : NULL;
     b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : folder_of(o->output);
-    if (b->target == NULL || b->scratch_folder == NULL || (replaces && b->replaced == NULL)) return mospt_err_nomem(err, n);
+    if (b->target == NULL || b->scratch_folder == NULL || (replaces && b->replaced == NULL))
+        return mospt_err_nomem(err, n);
     memcpy(b->target, o->output, n);
     strcpy(b->target + n, replaces ? BESIDE : "");
     if (access(b->scratch_folder, W_OK | X_OK) != 0)
-        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder),
+                             "cannot be written to");
     return true;
 }
 
@@ -120,11 +129,14 @@ static bool make_schema(build *b, mospt_err *err)
     mospt_schema *schema = &b->metadata->schema;
     const prep_source *source = &b->result->source;
     *schema = (mospt_schema){0};
-    if (!mospt_schema_add(schema, "scan", source->scan_count > UINT16_MAX ? MOSPT_U32 : MOSPT_U16, 1, err)) return false;
+    if (!mospt_schema_add(schema, "scan", source->scan_count > UINT16_MAX ? MOSPT_U32 : MOSPT_U16,
+                          1, err))
+        return false;
     for (uint32_t i = 0; i < source->scan_count; i++) {
         const mospt_schema *planes = &source->scans[i].info.attributes;
         for (uint32_t k = 0; k < planes->count; k++)
-            if (!mospt_schema_add(schema, planes->at[k].name, planes->at[k].type, planes->at[k].components, err)) {
+            if (!mospt_schema_add(schema, planes->at[k].name, planes->at[k].type,
+                                  planes->at[k].components, err)) {
                 if (err != NULL && err->file[0] == '\0')
                     snprintf(err->file, sizeof err->file, "%s", source->scans[i].path);
                 return false;
@@ -133,9 +145,9 @@ static bool make_schema(build *b, mospt_err *err)
     return true;
 }
 
-/* The step is that of the finest LAS file; floating-point scans beside it ask for a step of its size divided by a power of
- * two, so that the positions of both are kept.
- * doubtful  out: header bounds reach too far for that step, and have not been held against the points yet */
+/* The step is that of the finest LAS file; floating-point scans beside it ask for a step of its
+ * size divided by a power of two, so that the positions of both are kept. doubtful  out: header
+ * bounds reach too far for that step, and have not been held against the points yet */
 static bool make_grid(build *b, bool *doubtful, mospt_err *err)
 {
     const prep_source *source = &b->result->source;
@@ -146,7 +158,8 @@ static bool make_grid(build *b, bool *doubtful, mospt_err *err)
     for (uint32_t i = 0; i < source->scan_count; i++) {
         const prep_scan_info *info = &source->scans[i].info;
         all_measured = all_measured && source->scans[i].measured;
-        for (int a = 0; a < 3; a++) low[a] = fmin(low[a], info->low[a]), high[a] = fmax(high[a], info->high[a]);
+        for (int a = 0; a < 3; a++)
+            low[a] = fmin(low[a], info->low[a]), high[a] = fmax(high[a], info->high[a]);
         if (info->step > 0) {
             if (step == 0 || info->step < step) step = info->step;
             if (offset == NULL) offset = info->offset;
@@ -154,8 +167,10 @@ static bool make_grid(build *b, bool *doubtful, mospt_err *err)
             any_float = true;
         }
     }
-    for (int a = 0; a < 3; a++) extent = fmax(extent, high[a] - low[a]);
-    while (any_float && step > 0 && extent > 0 && step > ldexp(extent, -30)) step /= 2;
+    for (int a = 0; a < 3; a++)
+        extent = fmax(extent, high[a] - low[a]);
+    while (any_float && step > 0 && extent > 0 && step > ldexp(extent, -30))
+        step /= 2;
     bool ok = mospt_grid_make(low, high, step, offset, &b->metadata->grid, err);
     *doubtful = !all_measured && (!ok || (step > 0 && b->metadata->grid.step > step));
     return ok || *doubtful;
@@ -168,17 +183,21 @@ static bool check_space(const char *folder, uint64_t needed, const char *what, m
     uint64_t left = (uint64_t)disk.f_bavail * disk.f_frsize;
     if (left >= needed) return true;
     return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(folder),
-                         "%s takes up to %.1f MB there, and %.1f MB are free%s", what, (double)needed / 1e6,
-                         (double)left / 1e6, strcmp(what, "scratch space") == 0 ? "; --temp-dir names another disk" : "");
+                         "%s takes up to %.1f MB there, and %.1f MB are free%s", what,
+                         (double)needed / 1e6, (double)left / 1e6,
+                         strcmp(what, "scratch space") == 0 ? "; --temp-dir names another disk"
+                                                            : "");
 }
 
 /* Says how much disk will be needed, and stops where it is not there. */
 static bool check_disks(build *b, mospt_err *err)
 {
-    uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema), scratch = bytes + bytes / 16;
+    uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema),
+             scratch = bytes + bytes / 16;
     if (bytes < b->plan.store_memory) scratch = 0;
     if (b->options->announce != NULL)
-        b->options->announce(b->options->context, b->points_total, scratch + b->result->source.spool_size, bytes);
+        b->options->announce(b->options->context, b->points_total,
+                             scratch + b->result->source.spool_size, bytes);
     if (!check_space(b->scratch_folder, scratch, "scratch space", err)) return false;
     char *folder = folder_of(b->target);
     bool ok = folder != NULL && check_space(folder, bytes, "the dataset", err);
@@ -198,8 +217,8 @@ static void pack_slice(void *context, uint32_t slice)
     pack_job *job = context;
     uint32_t begin = slice * PACK_SLICE, end = begin + PACK_SLICE;
     job->sums[slice] = prep_pack_sums_empty;
-    prep_pack(&job->packer, job->batch, begin, end < job->batch->count ? end : job->batch->count, job->records,
-              &job->sums[slice]);
+    prep_pack(&job->packer, job->batch, begin, end < job->batch->count ? end : job->batch->count,
+              job->records, &job->sums[slice]);
 }
 
 /* Packs a batch with all workers. */
@@ -208,20 +227,28 @@ static prep_pack_sums pack_batch(build *b, const prep_batch *batch, uint32_t sca
 {
     prep_pack_sums sums = prep_pack_sums_empty;
     uint32_t slices = (batch->count + PACK_SLICE - 1) / PACK_SLICE;
-    pack_job job = {.batch = batch, .records = records, .sums = slice_sums,
-                    .packer = {.grid = &b->metadata->grid, .schema = &b->metadata->schema,
-                               .planes = &b->result->source.scans[scan].info.attributes, .scan = scan}};
+    pack_job job = {.batch = batch,
+                    .records = records,
+                    .sums = slice_sums,
+                    .packer = {.grid = &b->metadata->grid,
+                               .schema = &b->metadata->schema,
+                               .planes = &b->result->source.scans[scan].info.attributes,
+                               .scan = scan}};
     prep_workers_run(b->workers, slices, pack_slice, &job);
-    for (uint32_t i = 0; i < slices; i++) prep_pack_sums_add(&sums, &slice_sums[i]);
+    for (uint32_t i = 0; i < slices; i++)
+        prep_pack_sums_add(&sums, &slice_sums[i]);
     return sums;
 }
 
 /* Streams all scans through the first pass.
- * outside  out: a point was outside the root cube, which header bounds have promised not to happen; start again */
-static bool stream_points(build *b, prep_pass *pass, prep_pack_sums *of_scan, bool *outside, mospt_err *err)
+ * outside  out: a point was outside the root cube, which header bounds have promised not to happen;
+ * start again */
+static bool stream_points(build *b, prep_pass *pass, prep_pack_sums *of_scan, bool *outside,
+                          mospt_err *err)
 {
     prep_source *source = &b->result->source;
-    uint32_t room = b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count : PREP_BATCH_CAPACITY;
+    uint32_t room =
+        b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count : PREP_BATCH_CAPACITY;
     prep_stream *stream = NULL;
     uint8_t *records = malloc(room * mospt_record_size(&b->metadata->schema));
     prep_pack_sums *sums = malloc((room / PACK_SLICE + 1) * sizeof *sums);
@@ -240,7 +267,8 @@ static bool stream_points(build *b, prep_pass *pass, prep_pack_sums *of_scan, bo
         prep_pack_sums_add(&of_scan[scan], &packed);
         points += batch->count;
         ok = prep_pass_insert(pass, records, batch->count, err);
-        if (ok && !tell(b, points)) ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
+        if (ok && !tell(b, points))
+            ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     }
     prep_stream_close(stream);
     free(records), free(sums);
@@ -255,7 +283,9 @@ static bool measure(build *b, bool all, mospt_err *err)
     if (!prep_source_measure(source, all, tell_points, b, err)) return false;
     if (source->scan_count == 0) {
         if (source->left_out_count == 1 && err != NULL) *err = source->left_out[0].err;
-        else mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point to build from: %u files were left out", source->left_out_count);
+        else
+            mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(),
+                          "no point to build from: %u files were left out", source->left_out_count);
         return false;
     }
     for (uint32_t i = 0; i < source->scan_count; i++) {
@@ -271,21 +301,33 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
     bool ok = false;
     prep_pass *pass = NULL;
     size_t record_size = mospt_record_size(&b->metadata->schema);
-    b->shape = (prep_shape){.grid = &b->metadata->grid, .schema = &b->metadata->schema,
-                            .inner_depth = b->metadata->inner_depth, .add_threshold = b->metadata->add_threshold};
-    if (!prep_store_create(b->scratch_folder, record_size, b->plan.block_size, b->plan.store_memory, &b->store, err))
+    b->shape = (prep_shape){.grid = &b->metadata->grid,
+                            .schema = &b->metadata->schema,
+                            .inner_depth = b->metadata->inner_depth,
+                            .add_threshold = b->metadata->add_threshold};
+    if (!prep_store_create(b->scratch_folder, record_size, b->plan.block_size, b->plan.store_memory,
+                           &b->store, err))
         return false;
-    prep_pass_env env = {.shape = &b->shape, .workers = b->workers, .store = b->store, .writer = b->writer,
-                         .levels = b->plan.levels, .solve_memory = b->plan.solve_memory, .written = &b->written,
-                         .batch_count = b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count
-                                                                                 : PREP_BATCH_CAPACITY,
-                         .report = tell_written, .report_context = b};
+    prep_pass_env env = {.shape = &b->shape,
+                         .workers = b->workers,
+                         .store = b->store,
+                         .writer = b->writer,
+                         .levels = b->plan.levels,
+                         .solve_memory = b->plan.solve_memory,
+                         .written = &b->written,
+                         .batch_count = b->plan.batch_count > PREP_BATCH_CAPACITY
+                                            ? b->plan.batch_count
+                                            : PREP_BATCH_CAPACITY,
+                         .report = tell_written,
+                         .report_context = b};
     enter(b, PREP_PHASE_READ);
-    ok = prep_pass_begin(&env, b->metadata->grid.root, 0, &pass, err) && stream_points(b, pass, of_scan, outside, err);
+    ok = prep_pass_begin(&env, b->metadata->grid.root, 0, &pass, err) &&
+         stream_points(b, pass, of_scan, outside, err);
     if (ok && !*outside) {
         enter(b, PREP_PHASE_WRITE);
         b->points_total = 0;
-        for (uint32_t i = 0; i < b->result->source.scan_count; i++) b->points_total += b->result->source.scans[i].points;
+        for (uint32_t i = 0; i < b->result->source.scan_count; i++)
+            b->points_total += b->result->source.scans[i].points;
         if (b->points_total == 0) {
             prep_pass_abandon(pass);
             ok = mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point could be read");
@@ -327,7 +369,8 @@ static bool fill_source(mospt_source *to, const prep_source_scan *from, const pr
         /* The dataset speaks of its sources by their names, wherever the folder was. */
         const char *after = strstr(text, from->path) == text ? text + strlen(from->path) : NULL;
         char named[4096];
-        snprintf(named, sizeof named, "%s%s", after != NULL ? from->name : "", after != NULL ? after : text);
+        snprintf(named, sizeof named, "%s%s", after != NULL ? from->name : "",
+                 after != NULL ? after : text);
         to->damage = strdup(named);
         ok = ok && to->damage != NULL;
     }
@@ -369,25 +412,31 @@ static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *er
 /* Conservation of points is not a hope: what was read is what was written. */
 static bool check_conservation(const build *b, const mospt_metadata *m, mospt_err *err)
 {
-    if (b->written.points == b->points_total && b->written.points_hash == m->points_hash) return true;
+    if (b->written.points == b->points_total && b->written.points_hash == m->points_hash)
+        return true;
     return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(b->target),
-                         "%llu points were read and %llu written, with checksums %016llx and %016llx: this is an error of the program",
+                         "%llu points were read and %llu written, with checksums %016llx and "
+                         "%016llx: this is an error of the program",
                          (unsigned long long)b->points_total, (unsigned long long)b->written.points,
-                         (unsigned long long)m->points_hash, (unsigned long long)b->written.points_hash);
+                         (unsigned long long)m->points_hash,
+                         (unsigned long long)b->written.points_hash);
 }
 
-/* Where a file system cannot exchange two folders, the old one waits under a name that nobody has until the new one stands. */
+/* Where a file system cannot exchange two folders, the old one waits under a name that nobody has
+ * until the new one stands. */
 static bool exchange_in_steps(const char *fresh, const char *old, mospt_err *err)
 {
     char aside[4096];
-    if (snprintf(aside, sizeof aside, "%s.old-XXXXXX", old) >= (int)sizeof aside || mkdtemp(aside) == NULL ||
-        rename(old, aside) != 0)
+    if (snprintf(aside, sizeof aside, "%s.old-XXXXXX", old) >= (int)sizeof aside ||
+        mkdtemp(aside) == NULL || rename(old, aside) != 0)
         return mospt_err_set(err, MOSPT_EIO, mospt_at_file(old), "cannot be moved aside");
     if (rename(fresh, old) == 0 && rename(aside, fresh) == 0) return true;
-    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(fresh), "cannot be put in place; the old dataset is %s", aside);
+    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(fresh),
+                         "cannot be put in place; the old dataset is %s", aside);
 }
 
-/* Puts the new dataset in the place of the old one, in one step where the system can, and removes the old one last. */
+/* Puts the new dataset in the place of the old one, in one step where the system can, and removes
+ * the old one last. */
 static bool replace_output(build *b, mospt_err *err)
 {
     if (b->replaced == NULL) return true;
@@ -410,15 +459,20 @@ static bool run(build *b, mospt_err *err)
     b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
     b->metadata->add_threshold = PREP_ADD_THRESHOLD;
     if (!choose_folders(b, err)) return false;
-    /* Killed between its commit and its taking the place of the old one: nobody else has such a name. */
-    if (b->replaced != NULL && mospt_dataset_exists(b->target) && !mospt_file_remove_tree(b->target, err)) return false;
+    /* Killed between its commit and its taking the place of the old one: nobody else has such a
+     * name. */
+    if (b->replaced != NULL && mospt_dataset_exists(b->target) &&
+        !mospt_file_remove_tree(b->target, err))
+        return false;
     /* A place that cannot be had is known before the scans are read. */
     if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
     if (!prep_folder_list_make(o->inputs, o->input_count, &b->result->files, err)) return false;
-    if (!prep_source_open(&b->result->files, &o->scans, b->scratch_folder, source, err)) return false;
+    if (!prep_source_open(&b->result->files, &o->scans, b->scratch_folder, source, err))
+        return false;
     if (!measure(b, false, err)) return false;
     if (!make_schema(b, err)) return false;
-    if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth, &b->plan, err))
+    if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth,
+                        &b->plan, err))
         return false;
     if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
 
@@ -427,12 +481,14 @@ static bool run(build *b, mospt_err *err)
     for (int attempt = 0; attempt == 0 || outside; attempt++) {
         /* Bounds that lie: measure all scans, and start again with what they really are. */
         if (outside && !measure(b, true, err)) goto done;
-        for (uint32_t i = 0; i < source->scan_count; i++) of_scan[i] = prep_pack_sums_empty;
+        for (uint32_t i = 0; i < source->scan_count; i++)
+            of_scan[i] = prep_pack_sums_empty;
         if (!make_grid(b, &outside, err)) goto done;
         if (outside) continue;
         if (!build_tree(b, of_scan, &outside, err)) goto done;
         if (outside && attempt > 0) {
-            mospt_err_set(err, MOSPT_EIO, mospt_nowhere(), "the scans changed while they were read");
+            mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
+                          "the scans changed while they were read");
             goto done;
         }
     }

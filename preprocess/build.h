@@ -1,6 +1,7 @@
 /* preprocess/build.h - from files of scans to a dataset.
  *
- * Wimmer & Scheiblauer 2006, section 5.2: find the bounds, stream all points through passes, write the hierarchy. */
+ * Wimmer & Scheiblauer 2006, section 5.2: find the bounds, stream all points through passes, write
+ * the hierarchy. */
 #pragma once
 #include "mospt/dataset.h"
 #include "preprocess/source.h"
@@ -22,17 +23,18 @@ typedef struct {
 typedef struct {
     const char *const *inputs; /* [input_count] files and folders */
     size_t input_count;
-    const char *output;        /* the dataset */
-    const char *temp_dir;      /* for scratch files; NULL: beside the output */
-    bool force;                /* replace a dataset that is there */
-    uint32_t threads;          /* 0: one per processor */
-    uint64_t memory;           /* bytes, the peak of the process; 0: a quarter of the machine */
-    uint32_t inner_depth;      /* 0: 7 */
-    prep_scan_options scans;   /* columns, poses, crop */
-    const char *crs;           /* coordinate reference system; NULL: what the scans say */
+    const char *output;      /* the dataset */
+    const char *temp_dir;    /* for scratch files; NULL: beside the output */
+    bool force;              /* replace a dataset that is there */
+    uint32_t threads;        /* 0: one per processor */
+    uint64_t memory;         /* bytes, the peak of the process; 0: a quarter of the machine */
+    uint32_t inner_depth;    /* 0: 7 */
+    prep_scan_options scans; /* columns, poses, crop */
+    const char *crs;         /* coordinate reference system; NULL: what the scans say */
     /* Told often, by one thread at a time; returns false to stop. NULL: none. */
     bool (*progress)(void *context, const prep_progress *progress);
-    /* Told once, before the points are read: points (0: unknown) and the scratch space that may be needed. */
+    /* Told once, before the points are read: points (0: unknown) and the scratch space that may be
+     * needed. */
     void (*announce)(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes);
     void *context;
 } prep_build_options;
@@ -48,11 +50,12 @@ typedef struct {
 
 void prep_build_result_fini(prep_build_result *result);
 
-/* True if some of what was asked for is not in the dataset: a file left out, or a damaged one of which a part was read. */
+/* True if some of what was asked for is not in the dataset: a file left out, or a damaged one of
+ * which a part was read. */
 bool prep_build_left_something_out(const prep_build_result *result);
 
 /* Builds a dataset.
- * out      released by prep_build_result_fini(), also when the build fails: it says which files were left out
- * errors   MOSPT_EINVAL (output exists, memory too small), MOSPT_EEMPTY (no point in any input), MOSPT_EIO,
- *          MOSPT_ECANCELLED; nothing is left behind then */
+ * out      released by prep_build_result_fini(), also when the build fails: it says which files
+ * were left out errors   MOSPT_EINVAL (output exists, memory too small), MOSPT_EEMPTY (no point in
+ * any input), MOSPT_EIO, MOSPT_ECANCELLED; nothing is left behind then */
 bool prep_build(const prep_build_options *options, prep_build_result *out, mospt_err *err);

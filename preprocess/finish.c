@@ -21,7 +21,8 @@ typedef struct {
 /* Memory that finishing so many points in one go takes. */
 static size_t memory_for(const prep_pass_env *env, uint64_t count)
 {
-    return (size_t)count * (mospt_record_size(env->shape->schema) + prep_solve_point_size(env->shape));
+    return (size_t)count *
+           (mospt_record_size(env->shape->schema) + prep_solve_point_size(env->shape));
 }
 
 static bool report_progress(const prep_pass_env *env, mospt_err *err)
@@ -34,15 +35,17 @@ bool prep_finish_write(const prep_pass_env *env, const prep_subtree *made, mospt
 {
     for (uint32_t i = 0; i < made->node_count; i++) {
         const mospt_node *node = &made->nodes[i];
-        if (!mospt_writer_append(env->writer, node, made->payload + node->payload_offset, err)) return false;
+        if (!mospt_writer_append(env->writer, node, made->payload + node->payload_offset, err))
+            return false;
     }
     env->written->points += made->point_count;
     env->written->points_hash += made->points_hash;
     return report_progress(env, err);
 }
 
-/* Takes the next part as soon as there is memory for it; parts are taken in order, so the first one in flight can always be
- * written, and makes room for those after it. Returns false when there is none. */
+/* Takes the next part as soon as there is memory for it; parts are taken in order, so the first one
+ * in flight can always be written, and makes room for those after it. Returns false when there is
+ * none. */
 static bool take_part(line *l, uint32_t *part, size_t *memory)
 {
     pthread_mutex_lock(&l->lock);
@@ -73,7 +76,8 @@ static void fail(line *l, const mospt_err *err)
     pthread_mutex_unlock(&l->lock);
 }
 
-static bool solve_part(const prep_pass_env *env, const prep_finish_part *part, prep_subtree *made, mospt_err *err)
+static bool solve_part(const prep_pass_env *env, const prep_finish_part *part, prep_subtree *made,
+                       mospt_err *err)
 {
     uint32_t count = (uint32_t)part->spool->count;
     size_t size = count * mospt_record_size(env->shape->schema);
@@ -89,7 +93,8 @@ static bool solve_part(const prep_pass_env *env, const prep_finish_part *part, p
 static bool await_turn(line *l, uint32_t part)
 {
     pthread_mutex_lock(&l->lock);
-    while (!l->failed && l->next_to_write != part) pthread_cond_wait(&l->change, &l->lock);
+    while (!l->failed && l->next_to_write != part)
+        pthread_cond_wait(&l->change, &l->lock);
     bool go = !l->failed;
     pthread_mutex_unlock(&l->lock);
     return go;
@@ -125,9 +130,11 @@ static void work_on_line(void *context, uint32_t thread)
     }
 }
 
-static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts, uint32_t part_count, mospt_err *err)
+static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts,
+                         uint32_t part_count, mospt_err *err)
 {
-    line l = {.env = env, .parts = parts, .part_count = part_count, .memory_left = env->solve_memory};
+    line l = {
+        .env = env, .parts = parts, .part_count = part_count, .memory_left = env->solve_memory};
     if (part_count == 0) return true;
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
@@ -162,24 +169,27 @@ static bool finish_large(const prep_pass_env *env, const prep_finish_part *part,
     return false;
 }
 
-bool prep_finish(const prep_pass_env *env, const prep_finish_part *parts, uint32_t part_count, mospt_err *err)
+bool prep_finish(const prep_pass_env *env, const prep_finish_part *parts, uint32_t part_count,
+                 mospt_err *err)
 {
     uint32_t begin = 0;
     for (uint32_t i = 0; i < part_count; i++) {
         uint64_t count = parts[i].spool->count;
         if (count <= UINT32_MAX && memory_for(env, count) <= env->solve_memory) continue;
-        if (!finish_small(env, parts + begin, i - begin, err) || !finish_large(env, &parts[i], err)) return false;
+        if (!finish_small(env, parts + begin, i - begin, err) || !finish_large(env, &parts[i], err))
+            return false;
         begin = i + 1;
     }
     return finish_small(env, parts + begin, part_count - begin, err);
 }
 
-bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_t corner[3], uint32_t level,
-                      mospt_err *err)
+bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_t corner[3],
+                      uint32_t level, mospt_err *err)
 {
     size_t stride = mospt_record_size(env->shape->schema);
     uint32_t block_count = spool->block_count, filled = 0, n;
-    uint32_t room = PREP_PILE_MAX + env->shape->add_threshold + prep_store_block_capacity(env->store);
+    uint32_t room =
+        PREP_PILE_MAX + env->shape->add_threshold + prep_store_block_capacity(env->store);
     uint64_t left = spool->count;
     bool ok = true;
     uint8_t *records = malloc(room * stride);
@@ -193,7 +203,8 @@ bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_
         bool more = left > PREP_PILE_MAX && left - PREP_PILE_MAX >= env->shape->add_threshold;
         uint32_t count = more ? PREP_PILE_MAX : (uint32_t)left;
         prep_subtree made = {0};
-        ok = ok && prep_solve_node(env->shape, corner, level, more ? 1 : 0, records, count, &made, err) &&
+        ok = ok &&
+             prep_solve_node(env->shape, corner, level, more ? 1 : 0, records, count, &made, err) &&
              prep_finish_write(env, &made, err);
         prep_subtree_fini(&made);
         memmove(records, records + count * stride, (filled - count) * stride);

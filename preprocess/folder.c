@@ -104,7 +104,8 @@ static bool take_entry(finder *f, const char *folder, const char *prefix, const 
     if (stat(path, &st) != 0)
         goto done; /* a link that leads nowhere, or a file that has just gone */
     if (S_ISDIR(st.st_mode) && !has_extension(entry, "ipts")) ok = walk(f, path, name, err);
-    else if (S_ISREG(st.st_mode) && !prep_pose_is_sidecar(entry)) ok = add_file(f, path, name, false, err);
+    else if (S_ISREG(st.st_mode) && !prep_pose_is_sidecar(entry))
+        ok = add_file(f, path, name, false, err);
 done:
     free(path);
     free(name);

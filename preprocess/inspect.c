@@ -8,10 +8,12 @@
 
 /* Files up to this size are read whole without being asked for. */
 static const uint64_t READ_BYTES = UINT64_C(256) << 20;
-/* Projected coordinates of the Earth stay below 2 10^7 m; coordinates beyond are not in metres, or not of this world. */
+/* Projected coordinates of the Earth stay below 2 10^7 m; coordinates beyond are not in metres, or
+ * not of this world. */
 static const double FAR_M = 1e8;
 
-static void note(prep_inspection *in, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void note(prep_inspection *in, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
 
 static void note(prep_inspection *in, const char *format, ...)
 {
@@ -27,7 +29,8 @@ static bool read_points(prep_scan *scan, prep_inspection *in, mospt_err *err)
     prep_batch batch;
     if (!prep_batch_init(&batch, &in->info.attributes, PREP_BATCH_CAPACITY, err)) return false;
     bool ok;
-    for (int a = 0; a < 3; a++) in->low[a] = INFINITY, in->high[a] = -INFINITY;
+    for (int a = 0; a < 3; a++)
+        in->low[a] = INFINITY, in->high[a] = -INFINITY;
     while ((ok = prep_scan_read(scan, &batch, err)) && batch.count > 0) {
         for (uint32_t i = 0; i < 3 * batch.count; i++) {
             uint32_t a = i % 3;
@@ -37,7 +40,8 @@ static bool read_points(prep_scan *scan, prep_inspection *in, mospt_err *err)
         }
         in->points += batch.count;
     }
-    for (int a = 0; a < 3 && in->points > 0; a++) in->mean[a] /= (double)in->points;
+    for (int a = 0; a < 3 && in->points > 0; a++)
+        in->mean[a] /= (double)in->points;
     in->was_read = ok;
     prep_batch_fini(&batch);
     return ok;
@@ -54,17 +58,22 @@ static void judge(prep_inspection *in)
         if (in->low[a] >= info->low[a] - slack && in->high[a] <= info->high[a] + slack &&
             info->high[a] - info->low[a] <= 2 * (in->high[a] - in->low[a]) + slack)
             continue;
-        note(in, "the header says that %c reaches from %.10g to %.10g, the points do from %.10g to %.10g", "xyz"[a],
-             info->low[a], info->high[a], in->low[a], in->high[a]);
+        char axis = (char)('x' + a);
+        note(in,
+             "the header says that %c reaches from %.10g to %.10g, the points do from %.10g to "
+             "%.10g",
+             axis, info->low[a], info->high[a], in->low[a], in->high[a]);
     }
     if (in->was_read && info->point_count > 0 && in->damage.code == MOSPT_OK) {
         uint64_t all = in->points;
-        for (int r = 0; r < PREP_DROP_REASONS; r++) all += in->dropped[r];
+        for (int r = 0; r < PREP_DROP_REASONS; r++)
+            all += in->dropped[r];
         if (all != info->point_count)
-            note(in, "%llu points are declared, %llu are there", (unsigned long long)info->point_count,
-                 (unsigned long long)all);
+            note(in, "%llu points are declared, %llu are there",
+                 (unsigned long long)info->point_count, (unsigned long long)all);
     }
-    if (far > FAR_M) note(in, "coordinates reach %.3g: not metres, or points that are far off", far);
+    if (far > FAR_M)
+        note(in, "coordinates reach %.3g: not metres, or points that are far off", far);
     if (!info->has_rgb && !info->has_intensity) note(in, "neither colour nor intensity");
 }
 

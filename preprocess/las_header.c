@@ -78,18 +78,19 @@ static bool parse_geometry(const prep_input *in, const uint8_t *p, prep_las_head
     mospt_where at = {.file = prep_input_path(in), .kind = MOSPT_AT_BYTE};
     h->has_bounds = true;
     for (uint32_t a = 0; a < 3; a++) {
+        char axis = (char)('x' + a);
         h->scale[a] = prep_le_f64(p + 131 + 8 * a);
         h->offset[a] = prep_le_f64(p + 155 + 8 * a);
         h->high[a] = prep_le_f64(p + 179 + 16 * a);
         h->low[a] = prep_le_f64(p + 187 + 16 * a);
         at.place = 131 + 8 * a;
         if (!isfinite(h->scale[a]) || h->scale[a] <= 0)
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "the scale of axis %c is %g", "xyz"[a],
-                                 h -> scale[a]);
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the scale of axis %c is %g", axis,
+                                 h->scale[a]);
         at.place = 155 + 8 * a;
         if (!isfinite(h->offset[a]))
-            return mospt_err_set(err, MOSPT_EFORMAT, at, "the offset of axis %c is %g", "xyz"[a],
-                                 h -> offset[a]);
+            return mospt_err_set(err, MOSPT_EFORMAT, at, "the offset of axis %c is %g", axis,
+                                 h->offset[a]);
         if (!isfinite(h->low[a]) || !isfinite(h->high[a]) || h->low[a] > h->high[a])
             h->has_bounds = false;
     }
@@ -201,7 +202,8 @@ static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, u
         return read_extra(in, payload, size, h, err);
     if (strcmp(user, "LASF_Projection") != 0) return true;
     if (record == WKT_RECORD) return read_wkt(in, payload, size, h, err);
-    if (record == GEOKEYS_RECORD && h->crs[0] == '\0') return read_geokeys(in, payload, size, h, err);
+    if (record == GEOKEYS_RECORD && h->crs[0] == '\0')
+        return read_geokeys(in, payload, size, h, err);
     return true;
 }
 

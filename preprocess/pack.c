@@ -18,8 +18,8 @@ void prep_pack_sums_add(prep_pack_sums *sums, const prep_pack_sums *more)
     }
 }
 
-static void pack_vertices(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end,
-                          uint8_t *records, size_t stride, prep_pack_sums *sums)
+static void pack_vertices(const prep_packer *p, const prep_batch *batch, uint32_t begin,
+                          uint32_t end, uint8_t *records, size_t stride, prep_pack_sums *sums)
 {
     for (uint32_t i = begin; i < end; i++) {
         const double *world = batch->xyz + 3 * (size_t)i;
@@ -42,40 +42,49 @@ static void pack_vertices(const prep_packer *p, const prep_batch *batch, uint32_
 }
 
 /* The same value in every row. */
-static void pack_constant(uint8_t *rows, size_t stride, uint32_t begin, uint32_t end, const void *value, size_t size)
+static void pack_constant(uint8_t *rows, size_t stride, uint32_t begin, uint32_t end,
+                          const void *value, size_t size)
 {
-    for (uint32_t i = begin; i < end; i++) memcpy(rows + i * stride, value, size);
+    for (uint32_t i = begin; i < end; i++)
+        memcpy(rows + i * stride, value, size);
 }
 
-static void pack_plane(const prep_batch *batch, uint32_t k, const mospt_attribute *from, const mospt_attribute *to,
-                       uint32_t begin, uint32_t end, uint8_t *rows, size_t stride)
+static void pack_plane(const prep_batch *batch, uint32_t k, const mospt_attribute *from,
+                       const mospt_attribute *to, uint32_t begin, uint32_t end, uint8_t *rows,
+                       size_t stride)
 {
     const uint8_t *plane = batch->plane[k];
-    size_t size = batch->plane_size[k], from_size = mospt_type_size(from->type), to_size = mospt_type_size(to->type);
+    size_t size = batch->plane_size[k], from_size = mospt_type_size(from->type),
+           to_size = mospt_type_size(to->type);
     if (from->type != to->type) {
         for (uint32_t i = begin; i < end; i++)
             for (uint32_t c = 0; c < from->components; c++)
-                mospt_type_write(to->type, mospt_type_read(from->type, plane + i * size + c * from_size),
+                mospt_type_write(to->type,
+                                 mospt_type_read(from->type, plane + i * size + c * from_size),
                                  rows + i * stride + c * to_size);
         return;
     }
     switch (size) { /* constant sizes are one load and one store */
     case 1:
-        for (uint32_t i = begin; i < end; i++) rows[i * stride] = plane[i];
+        for (uint32_t i = begin; i < end; i++)
+            rows[i * stride] = plane[i];
         return;
     case 2:
-        for (uint32_t i = begin; i < end; i++) memcpy(rows + i * stride, plane + 2 * (size_t)i, 2);
+        for (uint32_t i = begin; i < end; i++)
+            memcpy(rows + i * stride, plane + 2 * (size_t)i, 2);
         return;
     case 8:
-        for (uint32_t i = begin; i < end; i++) memcpy(rows + i * stride, plane + 8 * (size_t)i, 8);
+        for (uint32_t i = begin; i < end; i++)
+            memcpy(rows + i * stride, plane + 8 * (size_t)i, 8);
         return;
     default:
-        for (uint32_t i = begin; i < end; i++) memcpy(rows + i * stride, plane + size * i, size);
+        for (uint32_t i = begin; i < end; i++)
+            memcpy(rows + i * stride, plane + size * i, size);
     }
 }
 
-void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end, uint8_t *records,
-               prep_pack_sums *sums)
+void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end,
+               uint8_t *records, prep_pack_sums *sums)
 {
     static const uint8_t zero[255 * 8];
     size_t stride = mospt_record_size(p->schema);

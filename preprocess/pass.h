@@ -1,12 +1,16 @@
-/* preprocess/pass.h - one pass: a stream of points fills several levels of the outer octree at once.
+/* preprocess/pass.h - one pass: a stream of points fills several levels of the outer octree at
+ * once.
  *
- * Wimmer & Scheiblauer 2006, section 5.2. Of each finest cell of a node the first point is accepted; the others go on to the
- * node in the next level, and after the last level of the pass into the rejection file of that octant. A rejection file that
- * fits in memory is finished in one go (preprocess/solve.h); a larger one is the input of another pass. What comes out does
- * not depend on the number of levels of a pass, on memory, or on threads: only on the points and their order.
+ * Wimmer & Scheiblauer 2006, section 5.2. Of each finest cell of a node the first point is
+ * accepted; the others go on to the node in the next level, and after the last level of the pass
+ * into the rejection file of that octant. A rejection file that fits in memory is finished in one
+ * go (preprocess/solve.h); a larger one is the input of another pass. What comes out does not
+ * depend on the number of levels of a pass, on memory, or on threads: only on the points and their
+ * order.
  *
- * Each batch is partitioned by the octant at the end of the pass (a stable counting sort), and one worker has one octant at
- * a time: it owns every cell there, at every level of the pass, so nothing is locked. */
+ * Each batch is partitioned by the octant at the end of the pass (a stable counting sort), and one
+ * worker has one octant at a time: it owns every cell there, at every level of the pass, so nothing
+ * is locked. */
 #pragma once
 #include "mospt/writer.h"
 #include "preprocess/solve.h"
@@ -42,8 +46,8 @@ typedef struct prep_pass prep_pass;
 size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth);
 
 /* Starts a pass at a node of the outer octree. env: borrowed until the end. */
-bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level, prep_pass **out,
-                     mospt_err *err);
+bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
+                     prep_pass **out, mospt_err *err);
 
 /* Inserts records, all inside the node, in the order in which they arrive.
  * records  [count][mospt_record_size()], count at most env->batch_count */

@@ -4,7 +4,8 @@
 
 #include <unistd.h>
 
-/* The program, its libraries, stacks, and what the allocator keeps: measured at 12 MiB, with room for the readers. */
+/* The program, its libraries, stacks, and what the allocator keeps: measured at 12 MiB, with room
+ * for the readers. */
 static const uint64_t FIXED_SIZE = UINT64_C(24) << 20;
 enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 1 << 20, BATCH_MIN = 8192, BATCH_MAX = 65536, BATCHES = 4 };
 
@@ -13,37 +14,47 @@ uint64_t prep_plan_machine_memory(void)
     return (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Spools that are being filled at the same time in a pass: accepted points of each level, and the rejected. */
+/* Spools that are being filled at the same time in a pass: accepted points of each level, and the
+ * rejected. */
 static uint64_t open_spools(uint32_t levels)
 {
     return (UINT64_C(1) << 3 * levels) * (levels + 1);
 }
 
-bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out, mospt_err *err)
+bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out,
+                    mospt_err *err)
 {
     prep_plan plan = {.levels = PREP_PASS_LEVELS_MAX};
     if (plan.levels > inner_depth) plan.levels = inner_depth;
     /* Codes of a pass are 32 bits. */
-    while (plan.levels > 1 && 3 * (plan.levels + inner_depth - 1) > 32) plan.levels--;
+    while (plan.levels > 1 && 3 * (plan.levels + inner_depth - 1) > 32)
+        plan.levels--;
     while (plan.levels > 1 && (prep_pass_cells_size(plan.levels, inner_depth) > memory / 8 ||
                                open_spools(plan.levels) * BLOCK_MIN > memory / 8))
         plan.levels--;
-    uint64_t cells = prep_pass_cells_size(plan.levels, inner_depth), spools = open_spools(plan.levels);
+    uint64_t cells = prep_pass_cells_size(plan.levels, inner_depth),
+             spools = open_spools(plan.levels);
 
     uint64_t block = memory / 8 / spools;
-    plan.block_size = (size_t)(block < BLOCK_MIN ? BLOCK_MIN : block > BLOCK_MAX ? BLOCK_MAX : block);
+    plan.block_size = (size_t)(block < BLOCK_MIN   ? BLOCK_MIN
+                               : block > BLOCK_MAX ? BLOCK_MAX
+                                                   : block);
     uint64_t batch = memory / 16 / (BATCHES * 2 * (record_size + 32));
-    plan.batch_count = (uint32_t)(batch < BATCH_MIN ? BATCH_MIN : batch > BATCH_MAX ? BATCH_MAX : batch);
+    plan.batch_count = (uint32_t)(batch < BATCH_MIN   ? BATCH_MIN
+                                  : batch > BATCH_MAX ? BATCH_MAX
+                                                      : batch);
 
     uint64_t taken = FIXED_SIZE + cells + spools * plan.block_size +
                      (uint64_t)plan.batch_count * BATCHES * 2 * (record_size + 32);
     if (memory < (uint64_t)PREP_MEMORY_MIN_MIB << 20 || memory < taken + (taken >> 3))
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                             "a memory limit of %llu MiB is too little: at inner depth %u it takes at least %llu MiB",
-                             (unsigned long long)(memory >> 20), inner_depth,
-                             (unsigned long long)(((taken + (taken >> 3)) >> 20) + 1 > PREP_MEMORY_MIN_MIB
-                                                      ? ((taken + (taken >> 3)) >> 20) + 1
-                                                      : PREP_MEMORY_MIN_MIB));
+        return mospt_err_set(
+            err, MOSPT_EINVAL, mospt_nowhere(),
+            "a memory limit of %llu MiB is too little: at inner depth %u it takes at least %llu "
+            "MiB",
+            (unsigned long long)(memory >> 20), inner_depth,
+            (unsigned long long)(((taken + (taken >> 3)) >> 20) + 1 > PREP_MEMORY_MIN_MIB
+                                     ? ((taken + (taken >> 3)) >> 20) + 1
+                                     : PREP_MEMORY_MIN_MIB));
     plan.solve_memory = (size_t)((memory - taken) / 8 * 4);
     plan.store_memory = (size_t)((memory - taken) / 8 * 3);
     *out = plan;

@@ -18,4 +18,5 @@ uint64_t prep_plan_machine_memory(void);
 /* Divides `memory` bytes, the peak of the whole process.
  * record_size  bytes of a point with its attributes
  * errors       MOSPT_EINVAL: too little, with the least that would do */
-bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out, mospt_err *err);
+bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out,
+                    mospt_err *err);

@@ -12,12 +12,14 @@
 enum { FILE_SIZE_MAX = 64 << 20 };
 static const char ENDING[] = ".pose.txt";
 
-/* Reads numbers up to `end`; commas count as blanks. Returns how many, or -1 if there is anything else. */
+/* Reads numbers up to `end`; commas count as blanks. Returns how many, or -1 if there is anything
+ * else. */
 static int read_numbers(const char *text, const char *end, double out[16])
 {
     int count = 0;
     for (;;) {
-        while (text < end && strchr(" \t\r\n,;", *text) != NULL) text++;
+        while (text < end && strchr(" \t\r\n,;", *text) != NULL)
+            text++;
         if (text == end) return count;
         if (count == 16 || (text = prep_number_parse(text, end, &out[count])) == NULL) return -1;
         count++;
@@ -38,8 +40,10 @@ static bool finish_matrix(int count, double m[16])
 
 static bool not_a_matrix(const char *path, uint64_t line, mospt_err *err)
 {
-    return mospt_err_set(err, MOSPT_EFORMAT, line > 0 ? mospt_at_line(path, line) : mospt_at_file(path),
-                         "is no pose: 12 or 16 numbers, row by row, that do not flatten space; the last row is 0 0 0 1");
+    return mospt_err_set(err, MOSPT_EFORMAT,
+                         line > 0 ? mospt_at_line(path, line) : mospt_at_file(path),
+                         "is no pose: 12 or 16 numbers, row by row, that do not flatten space; the "
+                         "last row is 0 0 0 1");
 }
 
 bool prep_pose_is_sidecar(const char *path)
@@ -50,17 +54,20 @@ bool prep_pose_is_sidecar(const char *path)
 
 void prep_pose_list_fini(prep_pose_list *list)
 {
-    for (size_t i = 0; i < list->count; i++) free(list->poses[i].name);
+    for (size_t i = 0; i < list->count; i++)
+        free(list->poses[i].name);
     free(list->poses);
     *list = (prep_pose_list){0};
 }
 
 /* One line: a name, and its numbers. */
-static bool add_line(prep_pose_list *list, const char *path, const char *text, const char *end, uint64_t line, mospt_err *err)
+static bool add_line(prep_pose_list *list, const char *path, const char *text, const char *end,
+                     uint64_t line, mospt_err *err)
 {
     bool quoted = *text == '"';
     const char *name = quoted ? text + 1 : text, *behind = name;
-    while (behind < end && (quoted ? *behind != '"' : strchr(" \t,;", *behind) == NULL)) behind++;
+    while (behind < end && (quoted ? *behind != '"' : strchr(" \t,;", *behind) == NULL))
+        behind++;
     prep_pose *poses = realloc(list->poses, (list->count + 1) * sizeof *poses);
     if (poses == NULL) return mospt_err_nomem(err, (list->count + 1) * sizeof *poses);
     list->poses = poses;
@@ -69,7 +76,8 @@ static bool add_line(prep_pose_list *list, const char *path, const char *text, c
     if (pose->name == NULL) return mospt_err_nomem(err, (size_t)(behind - name));
     list->count++;
     if (quoted && behind < end) behind++;
-    return finish_matrix(read_numbers(behind, end, pose->matrix), pose->matrix) || not_a_matrix(path, line, err);
+    return finish_matrix(read_numbers(behind, end, pose->matrix), pose->matrix) ||
+           not_a_matrix(path, line, err);
 }
 
 bool prep_pose_list_read(const char *path, prep_pose_list *out, mospt_err *err)
@@ -84,7 +92,8 @@ bool prep_pose_list_read(const char *path, prep_pose_list *out, mospt_err *err)
         if (end == NULL) end = bytes + size;
         next = end + 1;
         line++;
-        while (text < end && strchr(" \t\r", *text) != NULL) text++;
+        while (text < end && strchr(" \t\r", *text) != NULL)
+            text++;
         if (text < end && *text != '#') ok = add_line(&list, path, text, end, line, err);
     }
     free(bytes);
@@ -105,13 +114,14 @@ static bool read_sidecar(const char *path, double matrix[16], mospt_err *err)
     char *bytes = NULL;
     size_t size = 0;
     if (!mospt_file_read_whole(path, FILE_SIZE_MAX, &bytes, &size, err)) return false;
-    bool ok = finish_matrix(read_numbers(bytes, bytes + size, matrix), matrix) || not_a_matrix(path, 0, err);
+    bool ok = finish_matrix(read_numbers(bytes, bytes + size, matrix), matrix) ||
+              not_a_matrix(path, 0, err);
     free(bytes);
     return ok;
 }
 
-bool prep_pose_find(const prep_pose_list *list, const char *scan_path, const char *scan_name, bool *found, double matrix[16],
-                    mospt_err *err)
+bool prep_pose_find(const prep_pose_list *list, const char *scan_path, const char *scan_name,
+                    bool *found, double matrix[16], mospt_err *err)
 {
     const char *slash = strrchr(scan_path, '/'), *file = slash != NULL ? slash + 1 : scan_path;
     char sidecar[4096];
@@ -139,6 +149,7 @@ void prep_pose_multiply(const double a[16], const double b[16], double out[16])
     for (int r = 0; r < 4; r++)
         for (int c = 0; c < 4; c++) {
             out[4 * r + c] = 0;
-            for (int k = 0; k < 4; k++) out[4 * r + c] += a[4 * r + k] * b[4 * k + c];
+            for (int k = 0; k < 4; k++)
+                out[4 * r + c] += a[4 * r + k] * b[4 * k + c];
         }
 }

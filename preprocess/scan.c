@@ -241,12 +241,15 @@ static bool is_in_range(const double *xyz)
 static void move_info(prep_scan *scan)
 {
     prep_scan_info *info = &scan->info;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, pose[16];
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY},
+           pose[16];
     for (int corner = 0; corner < 8; corner++) {
         double in[3], out[3];
-        for (int a = 0; a < 3; a++) in[a] = corner >> a & 1 ? info->high[a] : info->low[a];
+        for (int a = 0; a < 3; a++)
+            in[a] = corner >> a & 1 ? info->high[a] : info->low[a];
         prep_pose_apply(scan->move, in, out);
-        for (int a = 0; a < 3; a++) low[a] = fmin(low[a], out[a]), high[a] = fmax(high[a], out[a]);
+        for (int a = 0; a < 3; a++)
+            low[a] = fmin(low[a], out[a]), high[a] = fmax(high[a], out[a]);
     }
     if (info->has_bounds) memcpy(info->low, low, sizeof low), memcpy(info->high, high, sizeof high);
     if (info->has_pose) prep_pose_multiply(scan->move, info->pose, pose);
@@ -254,7 +257,8 @@ static void move_info(prep_scan *scan)
     memcpy(info->pose, pose, sizeof pose);
     info->has_pose = true;
     info->step = 0; /* the file's lattice is turned */
-    for (int a = 0; a < 3; a++) info->offset[a] = 0;
+    for (int a = 0; a < 3; a++)
+        info->offset[a] = 0;
 }
 
 /* What the crop leaves of the declared bounds. Where that is nothing, reading will tell. */
@@ -270,7 +274,9 @@ static void crop_info(prep_scan *scan)
 
 static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_err *err)
 {
-    if (!prep_pose_find(options->poses, scan->path, scan->info.name, &scan->is_moved, scan->move, err)) return false;
+    if (!prep_pose_find(options->poses, scan->path, scan->info.name, &scan->is_moved, scan->move,
+                        err))
+        return false;
     if (scan->is_moved) move_info(scan);
     scan->has_crop = options->has_crop;
     memcpy(scan->crop_low, options->crop_low, sizeof scan->crop_low);
@@ -290,13 +296,15 @@ static bool is_kept(const prep_scan *scan, const double *xyz)
 static prep_drop reason_for(const double *p)
 {
     if (is_in_range(p)) return PREP_DROP_CROPPED;
-    return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) ? PREP_DROP_OUT_OF_RANGE : PREP_DROP_NOT_FINITE;
+    return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) ? PREP_DROP_OUT_OF_RANGE
+                                                              : PREP_DROP_NOT_FINITE;
 }
 
 static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     uint32_t first = 0;
-    while (first < batch->count && is_kept(scan, batch->xyz + 3 * (size_t)first)) first++;
+    while (first < batch->count && is_kept(scan, batch->xyz + 3 * (size_t)first))
+        first++;
     if (first == batch->count) return true;
 
     if (scan->keep_capacity < batch->count) {

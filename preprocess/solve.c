@@ -10,7 +10,7 @@ typedef struct {
     const prep_shape *shape;
     const uint8_t *records;
     size_t stride;
-    mospt_linear_key *keys;  /* [count] sorted; rejected points move to the front of a node's part */
+    mospt_linear_key *keys; /* [count] sorted; rejected points move to the front of a node's part */
     mospt_linear_key *spare; /* [count] for sorting, and for the points of the node being made */
     void *work;
     uint32_t *order; /* [count] */
@@ -38,9 +38,11 @@ static bool solver_init(solver *s, const prep_shape *shape, const uint8_t *recor
     s->work = malloc(mospt_linear_work_size(count));
     s->order = malloc(count * sizeof *s->order);
     s->made.payload = malloc(count * s->stride);
-    if (s->keys == NULL || s->spare == NULL || s->work == NULL || s->order == NULL || s->made.payload == NULL)
+    if (s->keys == NULL || s->spare == NULL || s->work == NULL || s->order == NULL ||
+        s->made.payload == NULL)
         return mospt_err_nomem(err, count * prep_solve_point_size(shape));
-    for (uint32_t i = 0; i < count; i++) s->keys[i].index = i;
+    for (uint32_t i = 0; i < count; i++)
+        s->keys[i].index = i;
     return true;
 }
 
@@ -76,18 +78,22 @@ static void sort_below(solver *s, uint32_t level, mospt_linear_key *keys, uint32
     prep_sort_keys(keys, s->spare + (keys - s->keys), count);
 }
 
-static bool emit(solver *s, const uint32_t corner[3], uint32_t level, uint8_t child_mask, uint32_t code_shift,
-                 mospt_linear_key *keys, uint32_t count, mospt_err *err)
+static bool emit(solver *s, const uint32_t corner[3], uint32_t level, uint8_t child_mask,
+                 uint32_t code_shift, mospt_linear_key *keys, uint32_t count, mospt_err *err)
 {
-    mospt_linear_input input = {.records = s->records, .stride = s->stride,
-                                .depth = s->shape->inner_depth, .code_shift = code_shift};
+    mospt_linear_input input = {.records = s->records,
+                                .stride = s->stride,
+                                .depth = s->shape->inner_depth,
+                                .code_shift = code_shift};
     if (level > UINT16_MAX)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "more than %d levels: too many points at one position", UINT16_MAX);
     mospt_node *node = add_node(&s->made, err);
     if (node == NULL) return false;
-    *node = (mospt_node){.corner = {corner[0], corner[1], corner[2]}, .level = (uint16_t)level,
-                         .child_mask = child_mask, .payload_offset = s->made.point_count * s->stride};
+    *node = (mospt_node){.corner = {corner[0], corner[1], corner[2]},
+                         .level = (uint16_t)level,
+                         .child_mask = child_mask,
+                         .payload_offset = s->made.point_count * s->stride};
     mospt_linear_build(&input, keys, count, s->work, s->order, node->level_end);
     uint8_t *payload = s->made.payload + node->payload_offset;
     mospt_payload_pack(s->shape->schema, s->records, s->order, count, payload, node);
@@ -97,7 +103,8 @@ static bool emit(solver *s, const uint32_t corner[3], uint32_t level, uint8_t ch
     return true;
 }
 
-/* All points at one position: the first PREP_PILE_MAX of them, then a child with the next, and so on. */
+/* All points at one position: the first PREP_PILE_MAX of them, then a child with the next, and so
+ * on. */
 static bool solve_pile(solver *s, const uint32_t corner[3], uint32_t level, mospt_linear_key *keys,
                        uint32_t count, mospt_err *err)
 {
@@ -115,14 +122,14 @@ static uint32_t octant_of(uint64_t code, uint32_t shift)
     return (uint32_t)(code >> shift) & (OCTANTS - 1);
 }
 
-/* Splits the keys of a node: those that it keeps go to `kept`, the others stay in front of `keys`; both in their order.
- * Which octants reject is decided here.
- * rejected  out, [OCTANTS] */
+/* Splits the keys of a node: those that it keeps go to `kept`, the others stay in front of `keys`;
+ * both in their order. Which octants reject is decided here. rejected  out, [OCTANTS] */
 static uint32_t split(const solver *s, mospt_linear_key *keys, uint32_t count, uint32_t cell_shift,
                       uint32_t octant_shift, mospt_linear_key *kept, uint32_t rejected[OCTANTS])
 {
     uint32_t kept_count = 0, left = 0;
-    for (int o = 0; o < OCTANTS; o++) rejected[o] = 0;
+    for (int o = 0; o < OCTANTS; o++)
+        rejected[o] = 0;
     for (uint32_t i = 1; i < count; i++)
         if (keys[i].code >> cell_shift == keys[i - 1].code >> cell_shift)
             rejected[octant_of(keys[i].code, octant_shift)]++;
@@ -157,9 +164,11 @@ static bool solve_node(solver *s, const uint32_t corner[3], uint32_t level, uint
 
     if (mospt_cell_bits(s->shape->grid, level) == 0) {
         /* In the order of arrival, which is that of the indices. */
-        for (uint32_t i = 0; i < count; i++) keys[i].code = keys[i].index;
+        for (uint32_t i = 0; i < count; i++)
+            keys[i].code = keys[i].index;
         prep_sort_keys(keys, spare, count);
-        for (uint32_t i = 0; i < count; i++) keys[i].code = 0;
+        for (uint32_t i = 0; i < count; i++)
+            keys[i].code = 0;
         return solve_pile(s, corner, level, keys, count, err);
     }
     if (level - base + depth > MOSPT_CODE_LEVELS) {
@@ -183,8 +192,8 @@ static bool solve_node(solver *s, const uint32_t corner[3], uint32_t level, uint
     return true;
 }
 
-bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t level, const uint8_t *records,
-                uint32_t count, prep_subtree *out, mospt_err *err)
+bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
+                const uint8_t *records, uint32_t count, prep_subtree *out, mospt_err *err)
 {
     solver s;
     bool ok = solver_init(&s, shape, records, count, err);
@@ -197,14 +206,16 @@ bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t leve
     return ok;
 }
 
-bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level, uint8_t child_mask,
-                     const uint8_t *records, uint32_t count, prep_subtree *out, mospt_err *err)
+bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
+                     uint8_t child_mask, const uint8_t *records, uint32_t count, prep_subtree *out,
+                     mospt_err *err)
 {
     solver s;
     bool ok = solver_init(&s, shape, records, count, err);
     if (ok) {
         sort_below(&s, level, s.keys, count);
-        ok = emit(&s, corner, level, child_mask, 3 * (MOSPT_CODE_LEVELS - shape->inner_depth), s.keys, count, err);
+        ok = emit(&s, corner, level, child_mask, 3 * (MOSPT_CODE_LEVELS - shape->inner_depth),
+                  s.keys, count, err);
     }
     if (ok) *out = s.made, s.made = (prep_subtree){0};
     solver_fini(&s);

@@ -2,7 +2,8 @@
 
 #include <string.h>
 
-/* Radix sort, least digit first. 11 bits: six digits for a code of 63 bits, and counters that fit the first cache. */
+/* Radix sort, least digit first. 11 bits: six digits for a code of 63 bits, and counters that fit
+ * the first cache. */
 enum { DIGIT_BITS = 11, DIGITS = 6, VALUES = 1 << DIGIT_BITS };
 
 static uint32_t digit_of(uint64_t code, int digit)
@@ -15,7 +16,8 @@ static void sort_few(mospt_linear_key *keys, uint32_t count)
     for (uint32_t i = 1; i < count; i++) {
         mospt_linear_key key = keys[i];
         uint32_t at = i;
-        for (; at > 0 && keys[at - 1].code > key.code; at--) keys[at] = keys[at - 1];
+        for (; at > 0 && keys[at - 1].code > key.code; at--)
+            keys[at] = keys[at - 1];
         keys[at] = key;
     }
 }
@@ -30,7 +32,8 @@ void prep_sort_keys(mospt_linear_key *keys, mospt_linear_key *spare, uint32_t co
     }
     memset(place, 0, sizeof place);
     for (uint32_t i = 0; i < count; i++)
-        for (int d = 0; d < DIGITS; d++) place[d][digit_of(keys[i].code, d)]++;
+        for (int d = 0; d < DIGITS; d++)
+            place[d][digit_of(keys[i].code, d)]++;
     for (int d = 0; d < DIGITS; d++) {
         if (place[d][digit_of(from[0].code, d)] == count) continue; /* all alike in this digit */
         for (uint32_t v = 0, sum = 0; v < VALUES; v++) {
@@ -38,7 +41,8 @@ void prep_sort_keys(mospt_linear_key *keys, mospt_linear_key *spare, uint32_t co
             place[d][v] = sum;
             sum += n;
         }
-        for (uint32_t i = 0; i < count; i++) to[place[d][digit_of(from[i].code, d)]++] = from[i];
+        for (uint32_t i = 0; i < count; i++)
+            to[place[d][digit_of(from[i].code, d)]++] = from[i];
         mospt_linear_key *swap = from;
         from = to, to = swap;
     }

@@ -24,22 +24,22 @@ static bool leave_out(prep_source *s, const char *name, const mospt_err *why, mo
     return true;
 }
 
-static bool add_scan(prep_source *s, const prep_folder_file *file, uint32_t index, const prep_scan_info *info,
-                     mospt_err *err)
+static bool add_scan(prep_source *s, const prep_folder_file *file, uint32_t index,
+                     const prep_scan_info *info, mospt_err *err)
 {
     prep_source_scan *list = realloc(s->scans, (s->scan_count + 1) * sizeof *list);
     if (list == NULL) return mospt_err_nomem(err, sizeof *list);
     s->scans = list;
-    list[s->scan_count] = (prep_source_scan){.path = strdup(file->path), .name = strdup(file->name), .index = index,
-                                             .info = *info};
+    list[s->scan_count] = (prep_source_scan){
+        .path = strdup(file->path), .name = strdup(file->name), .index = index, .info = *info};
     s->scan_count++;
     if (list[s->scan_count - 1].path == NULL || list[s->scan_count - 1].name == NULL)
         return mospt_err_nomem(err, strlen(file->path));
     return true;
 }
 
-bool prep_source_open(const prep_folder_list *list, const prep_scan_options *options, const char *scratch,
-                      prep_source *out, mospt_err *err)
+bool prep_source_open(const prep_folder_list *list, const prep_scan_options *options,
+                      const char *scratch, prep_source *out, mospt_err *err)
 {
     prep_source s = {.spool_fd = -1, .options = *options, .spool_folder = strdup(scratch)};
     bool ok = s.spool_folder != NULL || mospt_err_nomem(err, strlen(scratch));
@@ -70,8 +70,10 @@ static void free_scan(prep_source_scan *scan)
 
 void prep_source_close(prep_source *s)
 {
-    for (uint32_t i = 0; i < s->scan_count; i++) free_scan(&s->scans[i]);
-    for (uint32_t i = 0; i < s->left_out_count; i++) free(s->left_out[i].name);
+    for (uint32_t i = 0; i < s->scan_count; i++)
+        free_scan(&s->scans[i]);
+    for (uint32_t i = 0; i < s->left_out_count; i++)
+        free(s->left_out[i].name);
     if (s->spool_fd >= 0) close(s->spool_fd);
     free(s->scans), free(s->left_out), free(s->spool_folder);
     *s = (prep_source){.spool_fd = -1};
@@ -82,10 +84,13 @@ static bool move_batch(prep_source *s, prep_batch *batch, uint64_t *at, bool wri
 {
     void *part[MOSPT_ATTRIBUTES_MAX + 2] = {batch->xyz, batch->rgbi};
     size_t size[MOSPT_ATTRIBUTES_MAX + 2] = {24, 4};
-    for (uint32_t k = 0; k < batch->plane_count; k++) part[k + 2] = batch->plane[k], size[k + 2] = batch->plane_size[k];
+    for (uint32_t k = 0; k < batch->plane_count; k++)
+        part[k + 2] = batch->plane[k], size[k + 2] = batch->plane_size[k];
     for (uint32_t k = 0; k < batch->plane_count + 2; k++) {
-        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, *at, part[k], size[k] * batch->count, err)
-                        : mospt_file_read_at(s->spool_fd, s->spool_folder, *at, part[k], size[k] * batch->count, err);
+        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, *at, part[k],
+                                              size[k] * batch->count, err)
+                        : mospt_file_read_at(s->spool_fd, s->spool_folder, *at, part[k],
+                                             size[k] * batch->count, err);
         if (!ok) return false;
         *at += size[k] * batch->count;
     }
@@ -99,10 +104,12 @@ static bool spool_write(prep_source *s, prep_batch *batch, mospt_err *err)
         snprintf(path, sizeof path, "%s/instantpoints-text-XXXXXX", s->spool_folder);
         s->spool_fd = mkostemp(path, O_CLOEXEC);
         if (s->spool_fd < 0)
-            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(s->spool_folder), "no scratch file can be made there");
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(s->spool_folder),
+                                 "no scratch file can be made there");
         unlink(path);
     }
-    if (!mospt_file_write_at(s->spool_fd, s->spool_folder, s->spool_size, &batch->count, sizeof batch->count, err))
+    if (!mospt_file_write_at(s->spool_fd, s->spool_folder, s->spool_size, &batch->count,
+                             sizeof batch->count, err))
         return false;
     s->spool_size += sizeof batch->count;
     return move_batch(s, batch, &s->spool_size, true, err);
@@ -116,14 +123,15 @@ static void take_account(prep_source_scan *scan, const prep_scan *reader)
     if (damage != NULL) scan->damage = *damage;
 }
 
-static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *points, prep_source_report report,
-                         void *context, mospt_err *why, mospt_err *err)
+static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *points,
+                         prep_source_report report, void *context, mospt_err *why, mospt_err *err)
 {
     prep_scan *reader = NULL;
     prep_batch batch = {0};
     bool ok = false, keep = scan->info.is_text;
     if (!prep_scan_open(scan->path, scan->index, &s->options, &reader, why)) return true;
-    for (int a = 0; a < 3; a++) scan->info.low[a] = INFINITY, scan->info.high[a] = -INFINITY;
+    for (int a = 0; a < 3; a++)
+        scan->info.low[a] = INFINITY, scan->info.high[a] = -INFINITY;
     scan->points = 0;
     scan->spool_offset = s->spool_size;
     if (!prep_batch_init(&batch, &scan->info.attributes, PREP_BATCH_CAPACITY, err)) goto done;
@@ -159,7 +167,8 @@ done:
     return ok;
 }
 
-bool prep_source_measure(prep_source *s, bool all, prep_source_report report, void *context, mospt_err *err)
+bool prep_source_measure(prep_source *s, bool all, prep_source_report report, void *context,
+                         mospt_err *err)
 {
     uint32_t kept = 0;
     uint64_t points = 0;
@@ -198,7 +207,8 @@ struct prep_stream {
     pthread_mutex_t lock;
     pthread_cond_t change;
     /* Under the lock: */
-    uint64_t filled, used; /* slots so far; the first of them are filled % BATCHES and used % BATCHES */
+    uint64_t filled,
+        used; /* slots so far; the first of them are filled % BATCHES and used % BATCHES */
     bool end, stop;
     mospt_err err;
     /* The user's thread only: */
@@ -211,7 +221,8 @@ static bool prepare(prep_stream *st, slot *to, uint32_t scan, mospt_err *err)
     to->batch.count = 0;
     if (to->made && to->made_for == scan) return true;
     if (to->made) prep_batch_fini(&to->batch);
-    to->made = prep_batch_init(&to->batch, &st->source->scans[scan].info.attributes, st->capacity, err);
+    to->made =
+        prep_batch_init(&to->batch, &st->source->scans[scan].info.attributes, st->capacity, err);
     to->made_for = scan;
     return to->made;
 }
@@ -220,7 +231,8 @@ static bool prepare(prep_stream *st, slot *to, uint32_t scan, mospt_err *err)
 static slot *await_slot(prep_stream *st)
 {
     pthread_mutex_lock(&st->lock);
-    while (!st->stop && st->filled - st->used == BATCHES) pthread_cond_wait(&st->change, &st->lock);
+    while (!st->stop && st->filled - st->used == BATCHES)
+        pthread_cond_wait(&st->change, &st->lock);
     slot *free_slot = st->stop ? NULL : &st->slots[st->filled % BATCHES];
     pthread_mutex_unlock(&st->lock);
     return free_slot;
@@ -243,7 +255,8 @@ static bool stream_spool(prep_stream *st, uint32_t index, mospt_err *err)
         if (to == NULL) return true;
         uint32_t count;
         if (!prepare(st, to, index, err)) return false;
-        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, at, &count, sizeof count, err)) return false;
+        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, at, &count, sizeof count, err))
+            return false;
         at += sizeof count;
         to->batch.count = count;
         if (!move_batch(s, &to->batch, &at, false, err)) return false;
@@ -258,7 +271,8 @@ static bool stream_file(prep_stream *st, uint32_t index, mospt_err *err)
     prep_scan *reader = NULL;
     bool ok = true, more = true;
     scan->points = 0;
-    if (!prep_scan_open(scan->path, scan->index, &st->source->options, &reader, &scan->damage)) return true;
+    if (!prep_scan_open(scan->path, scan->index, &st->source->options, &reader, &scan->damage))
+        return true;
     while (more) {
         slot *to = await_slot(st);
         if (to == NULL) break;
@@ -284,7 +298,8 @@ static void *read_ahead(void *argument)
     mospt_err err = {0};
     bool ok = true;
     for (uint32_t i = 0; ok && i < st->source->scan_count; i++)
-        ok = st->source->scans[i].spool_size > 0 ? stream_spool(st, i, &err) : stream_file(st, i, &err);
+        ok = st->source->scans[i].spool_size > 0 ? stream_spool(st, i, &err)
+                                                 : stream_file(st, i, &err);
     pthread_mutex_lock(&st->lock);
     st->end = true;
     st->err = err;
@@ -293,13 +308,16 @@ static void *read_ahead(void *argument)
     return NULL;
 }
 
-bool prep_stream_open(prep_source *source, uint32_t batch_capacity, prep_stream **out, mospt_err *err)
+bool prep_stream_open(prep_source *source, uint32_t batch_capacity, prep_stream **out,
+                      mospt_err *err)
 {
     prep_stream *st = calloc(1, sizeof *st);
     if (st == NULL) return mospt_err_nomem(err, sizeof *st);
     st->source = source;
     /* What was spooled comes back in the batches in which it went. */
-    st->capacity = source->spool_size > 0 && batch_capacity < PREP_BATCH_CAPACITY ? PREP_BATCH_CAPACITY : batch_capacity;
+    st->capacity = source->spool_size > 0 && batch_capacity < PREP_BATCH_CAPACITY
+                       ? PREP_BATCH_CAPACITY
+                       : batch_capacity;
     pthread_mutex_init(&st->lock, NULL);
     pthread_cond_init(&st->change, NULL);
     if (pthread_create(&st->thread, NULL, read_ahead, st) != 0) {
@@ -321,7 +339,8 @@ bool prep_stream_next(prep_stream *st, const prep_batch **batch, uint32_t *scan,
         st->holds = false;
         pthread_cond_broadcast(&st->change);
     }
-    while (!st->end && st->filled == st->used) pthread_cond_wait(&st->change, &st->lock);
+    while (!st->end && st->filled == st->used)
+        pthread_cond_wait(&st->change, &st->lock);
     if (st->filled > st->used) {
         slot *from = &st->slots[st->used % BATCHES];
         *batch = &from->batch;

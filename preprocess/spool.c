@@ -24,8 +24,8 @@ struct prep_store {
     uint64_t slot_count; /* the scratch file is so many blocks long */
 };
 
-bool prep_store_create(const char *folder, size_t record_size, size_t block_size, size_t memory_size,
-                       prep_store **out, mospt_err *err)
+bool prep_store_create(const char *folder, size_t record_size, size_t block_size,
+                       size_t memory_size, prep_store **out, mospt_err *err)
 {
     prep_store *s = calloc(1, sizeof *s);
     if (s != NULL) s->folder = strdup(folder);
@@ -76,7 +76,8 @@ static bool open_scratch(prep_store *s, mospt_err *err)
         if (s->fd >= 0) unlink(path);
     }
     if (s->fd < 0)
-        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(s->folder), "no scratch file can be made there");
+        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(s->folder),
+                             "no scratch file can be made there");
     return true;
 }
 
@@ -195,15 +196,16 @@ static void release(prep_store *s, prep_block *block, bool sealed)
     block->count = 0;
 }
 
-bool prep_spool_take_block(prep_store *s, prep_spool *spool, uint32_t i, uint8_t *out, uint32_t *count,
-                           mospt_err *err)
+bool prep_spool_take_block(prep_store *s, prep_spool *spool, uint32_t i, uint8_t *out,
+                           uint32_t *count, mospt_err *err)
 {
     prep_block *block = &spool->blocks[i];
     size_t size = block->count * s->record_size;
     bool last = i + 1 == spool->block_count;
     *count = block->count;
     if (block->memory != NULL) memcpy(out, block->memory, size);
-    else if (!mospt_file_read_at(s->fd, s->folder, block->slot * s->block_size, out, size, err)) return false;
+    else if (!mospt_file_read_at(s->fd, s->folder, block->slot * s->block_size, out, size, err))
+        return false;
     spool->count -= block->count;
     release(s, block, !(last && spool->open));
     if (last) prep_spool_drop(s, spool);

@@ -16,10 +16,11 @@ typedef struct {
     uint8_t curve[PREP_TONE_STEPS];
 } prep_tone;
 
-/* Chooses the range: it is stretched between the 0.5 % and the 99.5 % percentile, so that a single mirror reflection does
- * not darken the scan; scanners that count to 255 seldom use all of it, so 8-bit values are stretched like all others.
- * Where most of a scan would be dark all the same, as asphalt is beside road marks, a power lifts it.
- * values   [count], reordered; NaN and infinities are passed over */
+/* Chooses the range: it is stretched between the 0.5 % and the 99.5 % percentile, so that a single
+ * mirror reflection does not darken the scan; scanners that count to 255 seldom use all of it, so
+ * 8-bit values are stretched like all others. Where most of a scan would be dark all the same, as
+ * asphalt is beside road marks, a power lifts it. values   [count], reordered; NaN and infinities
+ * are passed over */
 prep_tone prep_tone_make(double *values, size_t count);
 
 /* Number of samples that are enough to choose a range. */

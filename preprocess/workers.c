@@ -36,7 +36,8 @@ static void *help(void *argument)
     uint64_t seen = 0;
     pthread_mutex_lock(&w->lock);
     for (;;) {
-        while (w->round == seen && !w->stop) pthread_cond_wait(&w->start, &w->lock);
+        while (w->round == seen && !w->stop)
+            pthread_cond_wait(&w->start, &w->lock);
         if (w->stop) break;
         seen = w->round;
         pthread_mutex_unlock(&w->lock);
@@ -74,7 +75,8 @@ void prep_workers_destroy(prep_workers *w)
     w->stop = true;
     pthread_cond_broadcast(&w->start);
     pthread_mutex_unlock(&w->lock);
-    for (uint32_t i = 0; i < w->helper_count; i++) pthread_join(w->helpers[i], NULL);
+    for (uint32_t i = 0; i < w->helper_count; i++)
+        pthread_join(w->helpers[i], NULL);
     pthread_mutex_destroy(&w->lock);
     pthread_cond_destroy(&w->start);
     pthread_cond_destroy(&w->finish);
@@ -101,6 +103,7 @@ void prep_workers_run(prep_workers *w, uint32_t job_count, prep_job job, void *c
     pthread_mutex_unlock(&w->lock);
     take_jobs(w);
     pthread_mutex_lock(&w->lock);
-    while (w->busy > 0) pthread_cond_wait(&w->finish, &w->lock);
+    while (w->busy > 0)
+        pthread_cond_wait(&w->finish, &w->lock);
     pthread_mutex_unlock(&w->lock);
 }

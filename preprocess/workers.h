@@ -12,6 +12,6 @@ bool prep_workers_create(uint32_t thread_count, prep_workers **out, mospt_err *e
 void prep_workers_destroy(prep_workers *workers);
 uint32_t prep_workers_count(const prep_workers *workers);
 
-/* Calls job(context, 0) ... job(context, job_count - 1), in this order but at the same time, and waits for all.
- * threads  the creator's only */
+/* Calls job(context, 0) ... job(context, job_count - 1), in this order but at the same time, and
+ * waits for all. threads  the creator's only */
 void prep_workers_run(prep_workers *workers, uint32_t job_count, prep_job job, void *context);

@@ -55,7 +55,8 @@ void rend_camera_axes(const rend_camera *camera, double right[3], double up[3], 
     axes_from(direction, camera->up, right, up, back);
 }
 
-/* A view from a fixed direction on a box, before it is moved to where all that is to be seen fits. */
+/* A view from a fixed direction on a box, before it is moved to where all that is to be seen fits.
+ */
 typedef struct {
     double middle[3], half[3];
     double right[3], up[3], back[3];
@@ -166,7 +167,8 @@ static bool fit_to_points(const mospt_dataset *dataset, const double low[3], con
         reach[side] = of_side[n - 1 - n / STRAYS];
     }
     /* Points that all lie on one line of sight fill no picture. */
-    ok = ok && fmax(reach[0] + reach[1], reach[2] + reach[3]) > 1e-3 * fmax(o.half[0], fmax(o.half[1], o.half[2]));
+    ok = ok && fmax(reach[0] + reach[1], reach[2] + reach[3]) >
+                   1e-3 * fmax(o.half[0], fmax(o.half[1], o.half[2]));
     if (ok) stand_at(&o, reach, fov_rad, out);
     free(v), free(pushed);
     return ok;

@@ -372,7 +372,8 @@ static bool run(viewer *v, mospt_err *err)
     while (!v->quit) {
         rgl_event event;
         double seconds = rest(v);
-        if (v->options->should_stop != NULL && (seconds < 0 || seconds > STOP_ASKED_S)) seconds = STOP_ASKED_S;
+        if (v->options->should_stop != NULL && (seconds < 0 || seconds > STOP_ASKED_S))
+            seconds = STOP_ASKED_S;
         rgl_window_wait(v->window, seconds);
         if (v->options->should_stop != NULL && v->options->should_stop()) v->quit = true;
         while (rgl_window_next(v->window, &event))

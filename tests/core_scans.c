@@ -55,9 +55,13 @@ void core_las_write(const char *path, const core_las *las)
 void core_ply_write(const char *path, const double (*xyz)[3], uint32_t count)
 {
     FILE *f = open_file(path);
-    fprintf(f, "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty double y\n"
-               "property double z\nproperty uint tag\nend_header\n", count);
-    for (uint32_t i = 0; i < count; i++) fwrite(xyz[i], sizeof(double), 3, f), fwrite(&i, sizeof i, 1, f);
+    fprintf(f,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty "
+            "double y\n"
+            "property double z\nproperty uint tag\nend_header\n",
+            count);
+    for (uint32_t i = 0; i < count; i++)
+        fwrite(xyz[i], sizeof(double), 3, f), fwrite(&i, sizeof i, 1, f);
     if (fclose(f) != 0) abort();
 }
 
@@ -65,6 +69,7 @@ void core_text_write(const char *path, const double (*xyz)[3], uint32_t count)
 {
     FILE *f = open_file(path);
     for (uint32_t i = 0; i < count; i++)
-        fprintf(f, "%.17g %.17g %.17g %u %u 200\n", xyz[i][0], xyz[i][1], xyz[i][2], i & 255, i >> 8 & 255);
+        fprintf(f, "%.17g %.17g %.17g %u %u 200\n", xyz[i][0], xyz[i][1], xyz[i][2], i & 255,
+                i >> 8 & 255);
     if (fclose(f) != 0) abort();
 }

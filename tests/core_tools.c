@@ -20,12 +20,14 @@ void core_need(bool ok, const char *call, const mospt_err *err, const char *file
     _fail(file, line);
 }
 
-void core_fails(bool ok, const char *call, const mospt_err *err, mospt_code wanted, const char *file, int line)
+void core_fails(bool ok, const char *call, const mospt_err *err, mospt_code wanted,
+                const char *file, int line)
 {
     char text[2048];
     mospt_err_text(err, text, sizeof text);
     if (!ok && err->code == wanted && err->message[0] != '\0') return;
-    print_error("%s: %s, code %d: %s\n", call, ok ? "succeeded" : "failed", (int)err->code, ok ? "" : text);
+    print_error("%s: %s, code %d: %s\n", call, ok ? "succeeded" : "failed", (int)err->code,
+                ok ? "" : text);
     _fail(file, line);
 }
 
@@ -129,23 +131,35 @@ static uint32_t mask_of(uint32_t bits)
     return bits < 32 ? (UINT32_C(1) << bits) - 1 : UINT32_MAX;
 }
 
-static void place(core_kind kind, uint32_t bits, uint64_t *state, uint32_t centres[8][3], uint32_t g[3])
+static void place(core_kind kind, uint32_t bits, uint64_t *state, uint32_t centres[8][3],
+                  uint32_t g[3])
 {
     uint32_t mask = mask_of(bits), which = core_below(state, 8);
-    for (int a = 0; a < 3; a++) g[a] = (uint32_t)core_random(state) & mask;
+    for (int a = 0; a < 3; a++)
+        g[a] = (uint32_t)core_random(state) & mask;
     switch (kind) {
-    case CORE_CLUSTERED: { /* clusters of very different densities: what a scanner sees near and far */
+    case CORE_CLUSTERED: { /* clusters of very different densities: what a scanner sees near and far
+                            */
         uint32_t drop = which * 3 + 2;
         for (int a = 0; a < 3; a++)
             g[a] = (centres[which][a] + (bits > drop ? g[a] >> drop : g[a] & 1)) & mask;
         return;
     }
-    case CORE_PLANE: g[2] = mask / 3; return;
-    case CORE_LINE: g[1] = g[2] = mask / 2 + mask / 5; return;
-    case CORE_COPIES: memcpy(g, centres[which], sizeof centres[which]); return;
+    case CORE_PLANE:
+        g[2] = mask / 3;
+        return;
+    case CORE_LINE:
+        g[1] = g[2] = mask / 2 + mask / 5;
+        return;
+    case CORE_COPIES:
+        memcpy(g, centres[which], sizeof centres[which]);
+        return;
     case CORE_ONE_POSITION:
-    case CORE_IDENTICAL: memcpy(g, centres[0], sizeof centres[0]); return;
-    default: return;
+    case CORE_IDENTICAL:
+        memcpy(g, centres[0], sizeof centres[0]);
+        return;
+    default:
+        return;
     }
 }
 
@@ -154,19 +168,23 @@ void core_site_make(core_kind kind, uint32_t bits, uint32_t count, uint64_t seed
     mospt_err err = {0};
     uint32_t root = bits < 32 ? UINT32_C(1) << bits : 0, centres[8][3];
     uint64_t state = seed;
-    *out = (core_site){.grid = {.step = 0.001, .bits = bits, .base = {-500000, 7, 0}, .root = {root, 0, root}}, .count = count};
+    *out = (core_site){
+        .grid = {.step = 0.001, .bits = bits, .base = {-500000, 7, 0}, .root = {root, 0, root}},
+        .count = count};
     CORE_NEED(mospt_schema_add(&out->schema, "scan", MOSPT_U16, 1, &err));
     CORE_NEED(mospt_schema_add(&out->schema, "tag", MOSPT_U32, 1, &err));
     out->stride = mospt_record_size(&out->schema);
     out->records = calloc(count + 1, out->stride);
     assert_non_null(out->records);
     for (int c = 0; c < 8; c++)
-        for (int a = 0; a < 3; a++) centres[c][a] = (uint32_t)core_random(&state) & mask_of(bits);
+        for (int a = 0; a < 3; a++)
+            centres[c][a] = (uint32_t)core_random(&state) & mask_of(bits);
     for (uint32_t i = 0; i < count; i++) {
         uint32_t g[3], colour = (uint32_t)core_random(&state);
         uint8_t *record = out->records + i * out->stride;
         place(kind, bits, &state, centres, g);
-        for (int a = 0; a < 3; a++) g[a] += out->grid.root[a];
+        for (int a = 0; a < 3; a++)
+            g[a] += out->grid.root[a];
         memcpy(record, g, sizeof g);
         if (kind == CORE_IDENTICAL) continue;
         if (kind != CORE_EQUAL_COLOUR) colour &= 0xff3f1f0f; /* few shades, so that distances tie */
@@ -185,14 +203,19 @@ void core_site_fini(core_site *site)
 
 prep_shape core_shape(const core_site *site, uint32_t inner_depth, uint32_t add_threshold)
 {
-    return (prep_shape){.grid = &site->grid, .schema = &site->schema, .inner_depth = inner_depth,
+    return (prep_shape){.grid = &site->grid,
+                        .schema = &site->schema,
+                        .inner_depth = inner_depth,
                         .add_threshold = add_threshold};
 }
 
 void core_metadata_make(const core_site *site, uint32_t add_threshold, mospt_metadata *out)
 {
     uint32_t low[3] = {UINT32_MAX, UINT32_MAX, UINT32_MAX}, high[3] = {0};
-    *out = (mospt_metadata){.grid = site->grid, .schema = site->schema, .add_threshold = add_threshold, .source_count = 2};
+    *out = (mospt_metadata){.grid = site->grid,
+                            .schema = site->schema,
+                            .add_threshold = add_threshold,
+                            .source_count = 2};
     out->points_hash = mospt_hash_records(site->records, site->stride, site->count);
     out->sources = calloc(2, sizeof *out->sources);
     assert_non_null(out->sources);
@@ -215,10 +238,12 @@ void core_metadata_make(const core_site *site, uint32_t add_threshold, mospt_met
     mospt_grid_to_world(&site->grid, low, out->low);
     mospt_grid_to_world(&site->grid, high, out->high);
     for (int i = 0; i < 2; i++)
-        memcpy(out->sources[i].low, out->low, sizeof out->low), memcpy(out->sources[i].high, out->high, sizeof out->high);
+        memcpy(out->sources[i].low, out->low, sizeof out->low),
+            memcpy(out->sources[i].high, out->high, sizeof out->high);
 }
 
-void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add_threshold, const char *path)
+void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add_threshold,
+                       const char *path)
 {
     prep_shape shape = core_shape(site, inner_depth, add_threshold);
     prep_subtree made = {0};
@@ -228,7 +253,8 @@ void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add
     CORE_NEED(prep_solve(&shape, site->grid.root, 0, site->records, site->count, &made, &err));
     CORE_NEED(mospt_writer_create(path, inner_depth, &writer, &err));
     for (uint32_t i = 0; i < made.node_count; i++)
-        CORE_NEED(mospt_writer_append(writer, &made.nodes[i], made.payload + made.nodes[i].payload_offset, &err));
+        CORE_NEED(mospt_writer_append(writer, &made.nodes[i],
+                                      made.payload + made.nodes[i].payload_offset, &err));
     core_metadata_make(site, add_threshold, &metadata);
     CORE_NEED(mospt_writer_commit(writer, &metadata, &err));
     mospt_metadata_fini(&metadata);

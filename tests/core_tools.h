@@ -1,4 +1,5 @@
-/* tests/core_tools.h - what the tests of mospt/ and preprocess/ share: random numbers, scratch folders, made-up points. */
+/* tests/core_tools.h - what the tests of mospt/ and preprocess/ share: random numbers, scratch
+ * folders, made-up points. */
 #pragma once
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,13 +19,15 @@ void core_need(bool ok, const char *call, const mospt_err *err, const char *file
 
 /* Fails unless the call failed with this code and a sentence. */
 #define CORE_FAILS(call, wanted) core_fails((call), #call, &err, (wanted), __FILE__, __LINE__)
-void core_fails(bool ok, const char *call, const mospt_err *err, mospt_code wanted, const char *file, int line);
+void core_fails(bool ok, const char *call, const mospt_err *err, mospt_code wanted,
+                const char *file, int line);
 
 uint64_t core_random(uint64_t *state);
 uint32_t core_below(uint64_t *state, uint32_t limit);
 double core_unit(uint64_t *state); /* [0, 1) */
 
-/* A folder of its own, in memory where the system has such a thing. The path is owned; remove frees it. */
+/* A folder of its own, in memory where the system has such a thing. The path is owned; remove frees
+ * it. */
 char *core_folder_make(void);
 void core_folder_remove(char *path);
 char *core_path(const char *folder, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -43,7 +46,7 @@ typedef enum {
     CORE_CLUSTERED,
     CORE_PLANE,
     CORE_LINE,
-    CORE_COPIES,       /* few positions, many points each */
+    CORE_COPIES, /* few positions, many points each */
     CORE_ONE_POSITION,
     CORE_EQUAL_COLOUR, /* uniform */
     CORE_IDENTICAL,    /* all bytes alike */
@@ -66,7 +69,9 @@ prep_shape core_shape(const core_site *site, uint32_t inner_depth, uint32_t add_
 void core_metadata_make(const core_site *site, uint32_t add_threshold, mospt_metadata *out);
 
 /* Writes the dataset that prep_solve() makes of the site. */
-void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add_threshold, const char *path);
+void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add_threshold,
+                       const char *path);
 
-/* Number of things that mospt_check() finds, an error of opening counted as one. `first` may be NULL. */
+/* Number of things that mospt_check() finds, an error of opening counted as one. `first` may be
+ * NULL. */
 uint64_t core_findings(const char *path, mospt_err *first);

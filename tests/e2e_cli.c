@@ -1,5 +1,5 @@
-/* The program as people and scripts meet it: exit codes, what goes to which stream, and what is left when it is stopped.
- * argv[1] is the program. */
+/* The program as people and scripts meet it: exit codes, what goes to which stream, and what is
+ * left when it is stopped. argv[1] is the program. */
 #include "tests/core_scans.h"
 #include "tests/core_tools.h"
 
@@ -57,8 +57,12 @@ static pid_t start(const char *arguments, size_t file_limit)
     char *argv[ARGUMENTS_MAX + 2] = {(char *)(uintptr_t)program};
     snprintf(copy, sizeof copy, "%s", arguments);
     int count = 1;
-    for (char *word = strtok(copy, " "); word != NULL && count <= ARGUMENTS_MAX; word = strtok(NULL, " ")) argv[count++] = word;
-    if (chdir(folder) != 0 || freopen("stdout", "wb", stdout) == NULL || freopen("stderr", "wb", stderr) == NULL) _exit(98);
+    for (char *word = strtok(copy, " "); word != NULL && count <= ARGUMENTS_MAX;
+         word = strtok(NULL, " "))
+        argv[count++] = word;
+    if (chdir(folder) != 0 || freopen("stdout", "wb", stdout) == NULL ||
+        freopen("stderr", "wb", stderr) == NULL)
+        _exit(98);
     if (file_limit > 0) setrlimit(RLIMIT_FSIZE, &(struct rlimit){file_limit, file_limit});
     execv(program, argv);
     _exit(99);
@@ -82,13 +86,16 @@ static int run(const char *arguments)
 static void expect(const char *arguments, int code)
 {
     int got = run(arguments);
-    if (got != code) fail_msg("`instantpoints %s` ended with %d instead of %d; it said: %s", arguments, got, code, said);
+    if (got != code)
+        fail_msg("`instantpoints %s` ended with %d instead of %d; it said: %s", arguments, got,
+                 code, said);
 }
 
 static uint32_t lines_of(const char *text)
 {
     uint32_t lines = 0;
-    for (; *text != '\0'; text++) lines += *text == '\n';
+    for (; *text != '\0'; text++)
+        lines += *text == '\n';
     return lines;
 }
 
@@ -114,8 +121,12 @@ static void make_las(const char *name, uint32_t count)
     char *path = core_path(folder, "%s", name);
     assert_non_null(xyz);
     for (uint32_t i = 0; i < count; i++)
-        for (int a = 0; a < 3; a++) xyz[i][a] = (int32_t)core_below(&random, 1000000);
-    core_las las = {.scale = {0.001, 0.001, 0.001}, .offset = {500000, 5000000, 0}, .xyz = (const int32_t (*)[3])xyz, .count = count};
+        for (int a = 0; a < 3; a++)
+            xyz[i][a] = (int32_t)core_below(&random, 1000000);
+    core_las las = {.scale = {0.001, 0.001, 0.001},
+                    .offset = {500000, 5000000, 0},
+                    .xyz = (const int32_t(*)[3])xyz,
+                    .count = count};
     core_las_write(path, &las);
     free(path), free(xyz);
 }
@@ -138,17 +149,33 @@ static bool is_there(const char *name)
 static void wrong_use_is_exit_code_2_and_one_sentence(void **state)
 {
     static const char *const wrong[] = {
-        "nonsense", "build", "build a.las", "build -o", "build a.las -o x.ipts --nonsense", "build a.las -o x.ipts --threads 0",
-        "build a.las -o x.ipts --threads many", "build a.las -o x.ipts --memory -5", "build a.las -o x.ipts --inner-depth 10",
-        "build a.las -o x.ipts --inner-depth 7x", "info", "info a b", "info --force x", "check", "check a b", "help nonsense",
-        "check --memory 1G x", "-x", "--nonsense",
+        "nonsense",
+        "build",
+        "build a.las",
+        "build -o",
+        "build a.las -o x.ipts --nonsense",
+        "build a.las -o x.ipts --threads 0",
+        "build a.las -o x.ipts --threads many",
+        "build a.las -o x.ipts --memory -5",
+        "build a.las -o x.ipts --inner-depth 10",
+        "build a.las -o x.ipts --inner-depth 7x",
+        "info",
+        "info a b",
+        "info --force x",
+        "check",
+        "check a b",
+        "help nonsense",
+        "check --memory 1G x",
+        "-x",
+        "--nonsense",
     };
     (void)state;
     make_las("a.las", 10);
     for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
         expect(wrong[k], WRONG_USE);
         assert_string_equal(out, "");
-        if (lines_of(said) != 1 || strncmp(said, "instantpoints", 13) != 0) fail_msg("%s: %s", wrong[k], said);
+        if (lines_of(said) != 1 || strncmp(said, "instantpoints", 13) != 0)
+            fail_msg("%s: %s", wrong[k], said);
         assert_false(is_there("x.ipts"));
     }
     expect("", WRONG_USE); /* the page of all commands */
@@ -158,8 +185,10 @@ static void wrong_use_is_exit_code_2_and_one_sentence(void **state)
 
 static void help_goes_to_standard_output(void **state)
 {
-    static const char *const pages[] = {"help", "--help", "-h", "help build", "build --help", "build -h", "info --help", "check --help",
-                                        "help info", "help check", "help shot", "help view", "--version"};
+    static const char *const pages[] = {"help",         "--help",     "-h",          "help build",
+                                        "build --help", "build -h",   "info --help", "check --help",
+                                        "help info",    "help check", "help shot",   "help view",
+                                        "--version"};
     (void)state;
     for (size_t k = 0; k < sizeof pages / sizeof pages[0]; k++) {
         expect(pages[k], DONE);
@@ -268,9 +297,11 @@ static void each_file_becomes_a_dataset_once(void **state)
         expect("build --each a.las b.xyz c.las -o each --json", LEFT_OUT);
         json_t *json = parse_output(), *files = json_object_get(json, "files");
         assert_int_equal(json_array_size(files), 3);
-        const char *wanted[3] = {round == 0 ? "built" : "up to date", round == 0 ? "built" : "up to date", "failed"};
+        const char *wanted[3] = {round == 0 ? "built" : "up to date",
+                                 round == 0 ? "built" : "up to date", "failed"};
         for (size_t i = 0; i < 3; i++)
-            assert_string_equal(json_string_value(json_object_get(json_array_get(files, i), "status")), wanted[i]);
+            assert_string_equal(
+                json_string_value(json_object_get(json_array_get(files, i), "status")), wanted[i]);
         json_decref(json);
     }
     expect("check each/a.las.ipts", DONE);
@@ -316,8 +347,17 @@ static void input_left_out_is_exit_code_3(void **state)
 static void failures_are_exit_code_1_and_one_sentence(void **state)
 {
     static const char *const failing[] = {
-        "build missing.las -o x.ipts", "build b.las -o x.ipts", "build a.las -o nowhere/x.ipts", "build a.las -o x.ipts --temp-dir nowhere",
-        "build a.las -o x.ipts --memory 1M", "build a.las -o full", "build a.las -o full --force", "info missing.ipts", "info full", "check full -q", "info b.las",
+        "build missing.las -o x.ipts",
+        "build b.las -o x.ipts",
+        "build a.las -o nowhere/x.ipts",
+        "build a.las -o x.ipts --temp-dir nowhere",
+        "build a.las -o x.ipts --memory 1M",
+        "build a.las -o full",
+        "build a.las -o full --force",
+        "info missing.ipts",
+        "info full",
+        "check full -q",
+        "info b.las",
     };
     (void)state;
     make_las("a.las", 10);
@@ -328,7 +368,8 @@ static void failures_are_exit_code_1_and_one_sentence(void **state)
     make_text("full/note.txt", "mine");
     for (size_t k = 0; k < sizeof failing / sizeof failing[0]; k++) {
         expect(failing[k], FAILED);
-        if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0) fail_msg("%s: %s", failing[k], said);
+        if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0)
+            fail_msg("%s: %s", failing[k], said);
         assert_false(is_there("x.ipts"));
         assert_true(is_there("full/note.txt"));
     }
@@ -434,7 +475,8 @@ static void a_limit_on_the_size_of_files_is_like_a_full_disk(void **state)
 {
     (void)state;
     make_las("a.las", 20000);
-    assert_int_equal(finish(start("build a.las -o site.ipts -q", 5000)), FAILED); /* not ended by SIGXFSZ */
+    assert_int_equal(finish(start("build a.las -o site.ipts -q", 5000)),
+                     FAILED); /* not ended by SIGXFSZ */
     assert_int_equal(core_entries(folder), 1);
 }
 

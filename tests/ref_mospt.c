@@ -50,7 +50,8 @@ static uint32_t octant_at(const ref_mospt *m, const uint8_t *record, uint32_t de
     uint32_t g[3], octant = 0;
     if (depth >= m->bits) return 0;
     memcpy(g, record, sizeof g);
-    for (uint32_t a = 0; a < 3; a++) octant |= (g[a] >> (m->bits - 1 - depth) & 1) << a;
+    for (uint32_t a = 0; a < 3; a++)
+        octant |= (g[a] >> (m->bits - 1 - depth) & 1) << a;
     return octant;
 }
 
@@ -59,7 +60,8 @@ static bool insert(ref_mospt *m, cell *c, uint32_t depth, const uint8_t *record,
     if (!c->is_inner && c->count > 0 && depth == m->depth && reject) return false;
     if (!c->is_inner && (c->count == 0 || depth == m->depth)) {
         if ((c->count & (c->count - 1)) == 0) /* grows at powers of two */
-            c->items = realloc(c->items, (c->count > 0 ? 2 * (size_t)c->count : 1) * sizeof *c->items);
+            c->items =
+                realloc(c->items, (c->count > 0 ? 2 * (size_t)c->count : 1) * sizeof *c->items);
         if (c->items == NULL) abort();
         c->items[c->count++] = (item){.record = record};
         return true;
@@ -95,7 +97,8 @@ static item *nearest_to_average(item **items, uint32_t n)
     int64_t sum[3] = {0}, least = 0;
     item *nearest = NULL;
     for (uint32_t i = 0; i < n; i++)
-        for (int k = 0; k < 3; k++) sum[k] += items[i]->record[12 + k];
+        for (int k = 0; k < 3; k++)
+            sum[k] += items[i]->record[12 + k];
     for (uint32_t i = 0; i < n; i++) {
         int64_t distance = 0;
         for (int k = 0; k < 3; k++) {

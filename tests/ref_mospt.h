@@ -1,7 +1,8 @@
 /* tests/ref_mospt.h - the slow, obvious twin of mospt/linear.c: an octree of pointers.
  *
- * Word for word Wimmer & Scheiblauer 2006, section 4.6: points are inserted one by one, leaves are split, and when all are
- * there, each inner node takes over the point of the child whose colour is nearest to the average of its children. */
+ * Word for word Wimmer & Scheiblauer 2006, section 4.6: points are inserted one by one, leaves are
+ * split, and when all are there, each inner node takes over the point of the child whose colour is
+ * nearest to the average of its children. */
 #pragma once
 #include "mospt/linear.h"
 

@@ -23,11 +23,13 @@ static uint32_t octant_of(const uint8_t *record, uint32_t bits)
 {
     uint32_t g[3];
     memcpy(g, record, sizeof g);
-    return bits == 0 ? 0 : (g[0] >> (bits - 1) & 1) | (g[1] >> (bits - 1) & 1) << 1 | (g[2] >> (bits - 1) & 1) << 2;
+    return bits == 0 ? 0
+                     : (g[0] >> (bits - 1) & 1) | (g[1] >> (bits - 1) & 1) << 1 |
+                           (g[2] >> (bits - 1) & 1) << 2;
 }
 
-static void build_node(const prep_shape *shape, size_t stride, const uint32_t corner[3], uint32_t level, const list *input,
-                       ref_tree *tree)
+static void build_node(const prep_shape *shape, size_t stride, const uint32_t corner[3],
+                       uint32_t level, const list *input, ref_tree *tree)
 {
     uint32_t bits = level < shape->grid->bits ? shape->grid->bits - level : 0;
     list rejected[8] = {{0}};
@@ -40,12 +42,14 @@ static void build_node(const prep_shape *shape, size_t stride, const uint32_t co
     for (uint32_t i = 0; i < input->count; i++) {
         /* A node one step wide has only one cell: it takes a pile of points as it comes. */
         bool to_pile = bits == 0 && i < PREP_PILE_MAX;
-        if (!ref_mospt_insert(m, input->at[i], !to_pile)) append(&rejected[octant_of(input->at[i], bits)], input->at[i]);
+        if (!ref_mospt_insert(m, input->at[i], !to_pile))
+            append(&rejected[octant_of(input->at[i], bits)], input->at[i]);
     }
     for (uint32_t o = 0; o < 8; o++) {
         if (rejected[o].count >= shape->add_threshold) node.child_mask |= (uint8_t)(1u << o);
         else
-            for (uint32_t i = 0; i < rejected[o].count; i++) ref_mospt_insert(m, rejected[o].at[i], false);
+            for (uint32_t i = 0; i < rejected[o].count; i++)
+                ref_mospt_insert(m, rejected[o].at[i], false);
     }
     node.count = ref_mospt_count(m);
     node.points = malloc((node.count + 1) * sizeof *node.points);
@@ -55,8 +59,10 @@ static void build_node(const prep_shape *shape, size_t stride, const uint32_t co
     tree->nodes[index] = node;
     for (uint32_t o = 0; o < 8; o++) {
         uint32_t child[3];
-        for (int a = 0; a < 3; a++) child[a] = corner[a] + (bits > 0 && (o >> a & 1) ? UINT32_C(1) << (bits - 1) : 0);
-        if (node.child_mask >> o & 1) build_node(shape, stride, child, level + 1, &rejected[o], tree);
+        for (int a = 0; a < 3; a++)
+            child[a] = corner[a] + (bits > 0 && (o >> a & 1) ? UINT32_C(1) << (bits - 1) : 0);
+        if (node.child_mask >> o & 1)
+            build_node(shape, stride, child, level + 1, &rejected[o], tree);
         free(rejected[o].at);
     }
 }
@@ -64,7 +70,8 @@ static void build_node(const prep_shape *shape, size_t stride, const uint32_t co
 void ref_tree_build(const prep_shape *shape, const core_site *site, ref_tree *out)
 {
     list all = {0};
-    for (uint32_t i = 0; i < site->count; i++) append(&all, site->records + i * site->stride);
+    for (uint32_t i = 0; i < site->count; i++)
+        append(&all, site->records + i * site->stride);
     *out = (ref_tree){0};
     build_node(shape, site->stride, site->grid.root, 0, &all, out);
     free(all.at);
@@ -72,7 +79,8 @@ void ref_tree_build(const prep_shape *shape, const core_site *site, ref_tree *ou
 
 void ref_tree_fini(ref_tree *tree)
 {
-    for (uint32_t i = 0; i < tree->count; i++) free(tree->nodes[i].points);
+    for (uint32_t i = 0; i < tree->count; i++)
+        free(tree->nodes[i].points);
     free(tree->nodes);
     *tree = (ref_tree){0};
 }

@@ -1,5 +1,6 @@
-/* tests/ref_tree.h - the slow, obvious twin of preprocess/solve.c and pass.c: the nested octree as Wimmer & Scheiblauer 2006,
- * section 5.2, describe it, one node after the other, with lists for rejection files. */
+/* tests/ref_tree.h - the slow, obvious twin of preprocess/solve.c and pass.c: the nested octree as
+ * Wimmer & Scheiblauer 2006, section 5.2, describe it, one node after the other, with lists for
+ * rejection files. */
 #pragma once
 #include "tests/core_tools.h"
 

@@ -77,7 +77,8 @@ static points read_dataset(const char *path, mospt_metadata *metadata_copy)
         for (uint32_t j = 0; j < n; j++) {
             point *p = &all.at[all.count++];
             uint16_t scan;
-            memcpy(&scan, planes + n * d->metadata.schema.at[k].offset + j * sizeof scan, sizeof scan);
+            memcpy(&scan, planes + n * d->metadata.schema.at[k].offset + j * sizeof scan,
+                   sizeof scan);
             p->scan = scan;
             mospt_grid_to_world(&d->metadata.grid, (uint32_t[3]){v[j].x, v[j].y, v[j].z}, p->xyz);
         }
@@ -95,16 +96,19 @@ static points read_dataset(const char *path, mospt_metadata *metadata_copy)
 static void add_point(points *list, const double xyz[3], uint32_t scan)
 {
     if ((list->count & (list->count - 1)) == 0) {
-        list->at = realloc(list->at, (list->count > 0 ? 2 * (size_t)list->count : 1) * sizeof *list->at);
+        list->at =
+            realloc(list->at, (list->count > 0 ? 2 * (size_t)list->count : 1) * sizeof *list->at);
         assert_non_null(list->at);
     }
     point *p = &list->at[list->count++];
     memset(p, 0, sizeof *p);
-    for (int a = 0; a < 3; a++) p->xyz[a] = xyz[a];
+    for (int a = 0; a < 3; a++)
+        p->xyz[a] = xyz[a];
     p->scan = scan;
 }
 
-/* The dataset holds these points, each at most `off` away along an axis. Sorted neighbours must not be nearer than that. */
+/* The dataset holds these points, each at most `off` away along an axis. Sorted neighbours must not
+ * be nearer than that. */
 static void assert_holds(const char *path, points *wanted, double off)
 {
     points got = read_dataset(path, NULL);
@@ -114,7 +118,8 @@ static void assert_holds(const char *path, points *wanted, double off)
         assert_int_equal(got.at[i].scan, wanted->at[i].scan);
         for (int a = 0; a < 3; a++)
             if (!(fabs(got.at[i].xyz[a] - wanted->at[i].xyz[a]) <= off))
-                fail_msg("point %u: %.17g instead of %.17g", i, got.at[i].xyz[a], wanted->at[i].xyz[a]);
+                fail_msg("point %u: %.17g instead of %.17g", i, got.at[i].xyz[a],
+                         wanted->at[i].xyz[a]);
     }
     free(got.at);
 }
@@ -140,7 +145,8 @@ static void make_world(uint32_t count, const double centre[3], double width, uin
 {
     uint64_t random = seed;
     for (uint32_t i = 0; i < count; i++)
-        for (int a = 0; a < 3; a++) world[i][a] = centre[a] + width * (core_unit(&random) - 0.5);
+        for (int a = 0; a < 3; a++)
+            world[i][a] = centre[a] + width * (core_unit(&random) - 0.5);
 }
 
 static char *scan_path(const char *name)
@@ -157,13 +163,15 @@ static void write_las(const char *name, uint32_t count, const core_las *as)
     free(path);
 }
 
-static const core_las millimetres = {.scale = {0.001, 0.001, 0.001}, .offset = {500000, -5000000, 100}};
+static const core_las millimetres = {.scale = {0.001, 0.001, 0.001},
+                                     .offset = {500000, -5000000, 100}};
 
 static void add_las_points(points *list, uint32_t count, const core_las *las, uint32_t scan)
 {
     for (uint32_t i = 0; i < count; i++) {
         double at[3];
-        for (int a = 0; a < 3; a++) at[a] = raw[i][a] * las->scale[a] + las->offset[a];
+        for (int a = 0; a < 3; a++)
+            at[a] = raw[i][a] * las->scale[a] + las->offset[a];
         add_point(list, at, scan);
     }
 }
@@ -171,7 +179,7 @@ static void add_las_points(points *list, uint32_t count, const core_las *las, ui
 static void write_ply(const char *name, uint32_t count)
 {
     char *path = scan_path(name);
-    core_ply_write(path, (const double (*)[3])world, count);
+    core_ply_write(path, (const double(*)[3])world, count);
     free(path);
 }
 
@@ -214,7 +222,8 @@ static void build_good(const prep_build_options *options, prep_build_result *res
     prep_build_result own;
     CORE_NEED(build_with(options, result != NULL ? result : &own, &err));
     if (result == NULL) prep_build_result_fini(&own);
-    if (core_findings(options->output != NULL ? options->output : output, &err) > 0) CORE_NEED(false);
+    if (core_findings(options->output != NULL ? options->output : output, &err) > 0)
+        CORE_NEED(false);
 }
 
 static void build_fails(const prep_build_options *options, mospt_code code, mospt_err *said)
@@ -257,7 +266,8 @@ static void las_positions_are_kept_bit_for_bit(void **state)
             for (uint32_t i = 0; i < wanted.count; i++)
                 low = fmin(low, wanted.at[i].xyz[a]), high = fmax(high, wanted.at[i].xyz[a]);
             assert_true(result.metadata.low[a] == low && result.metadata.high[a] == high);
-            assert_true(result.metadata.sources[0].low[a] == low && result.metadata.sources[0].high[a] == high);
+            assert_true(result.metadata.sources[0].low[a] == low &&
+                        result.metadata.sources[0].high[a] == high);
         }
         prep_build_result_fini(&result);
         free(wanted.at);
@@ -276,12 +286,14 @@ static void scans_of_all_formats_come_together(void **state)
     add_las_points(&wanted, 20000, &millimetres, 0);
     make_world(15000, millimetres.offset, 90, 2);
     write_ply("b.ply", 15000);
-    for (uint32_t i = 0; i < 15000; i++) add_point(&wanted, world[i], 1);
+    for (uint32_t i = 0; i < 15000; i++)
+        add_point(&wanted, world[i], 1);
     make_world(10000, millimetres.offset, 90, 3);
     char *path = scan_path("c.xyz");
-    core_text_write(path, (const double (*)[3])world, 10000);
+    core_text_write(path, (const double(*)[3])world, 10000);
     free(path);
-    for (uint32_t i = 0; i < 10000; i++) add_point(&wanted, world[i], 2);
+    for (uint32_t i = 0; i < 10000; i++)
+        add_point(&wanted, world[i], 2);
 
     build_good(&defaults, &result);
     const mospt_metadata *m = &result.metadata;
@@ -294,7 +306,8 @@ static void scans_of_all_formats_come_together(void **state)
     assert_int_equal(m->sources[2].points, 10000);
     assert_int_equal(m->point_count, 45000);
     assert_true(m->sources[2].has_rgb && !m->sources[0].has_rgb && m->sources[0].has_intensity);
-    assert_true(mospt_schema_find(&m->schema, "intensity") >= 0 && mospt_schema_find(&m->schema, "tag") >= 0);
+    assert_true(mospt_schema_find(&m->schema, "intensity") >= 0 &&
+                mospt_schema_find(&m->schema, "tag") >= 0);
     assert_false(prep_build_left_something_out(&result));
     /* An error within the rounding of the coordinates themselves is none of the grid's. */
     assert_true(m->position_error <= m->grid.step / 2 + 5e6 * 0x1p-51);
@@ -314,7 +327,8 @@ static void coordinates_far_from_zero_keep_their_precision(void **state)
         prep_build_result result;
         make_world(5000, (const double[3]){1e7, -1e7, 1e7}, widths[k], (uint64_t)k);
         write_ply("far.ply", 5000);
-        for (uint32_t i = 0; i < 5000; i++) add_point(&wanted, world[i], 0);
+        for (uint32_t i = 0; i < 5000; i++)
+            add_point(&wanted, world[i], 0);
         build_good(&defaults, &result);
         assert_true(result.metadata.position_error <= result.metadata.grid.step / 2);
         assert_true(result.metadata.position_error <= fmax(ldexp(widths[k], -29), 4e-9));
@@ -329,12 +343,15 @@ static void coordinates_far_from_zero_keep_their_precision(void **state)
 /* Header bounds of a LAS file, whatever they claim, must not change what is kept. */
 static void lying_header_bounds_do_no_harm(void **state)
 {
-    static const double zero[3], small_high[3] = {500001, -4999999, 101}, far_low[3] = {-9e8, -9e8, -9e8}, far_high[3] = {9e8, 9e8, 9e8},
-                        mad_low[3] = {-1.7e308, -1.7e308, -1.7e308}, mad_high[3] = {1.7e308, 1.7e308, 1.7e308},
-                        elsewhere[3] = {1e6, 1e6, 1e6}, beyond[3] = {1e300, 1e300, 1e300};
+    static const double zero[3],
+        small_high[3] = {500001, -4999999, 101}, far_low[3] = {-9e8, -9e8, -9e8},
+        far_high[3] = {9e8, 9e8, 9e8}, mad_low[3] = {-1.7e308, -1.7e308, -1.7e308},
+        mad_high[3] = {1.7e308, 1.7e308, 1.7e308}, elsewhere[3] = {1e6, 1e6, 1e6},
+        beyond[3] = {1e300, 1e300, 1e300};
     static const struct {
         const double *low, *high;
-    } lies[] = {{zero, zero}, {millimetres.offset, small_high}, {far_low, far_high}, {mad_low, mad_high}, {elsewhere, elsewhere}, {zero, beyond}};
+    } lies[] = {{zero, zero},        {millimetres.offset, small_high}, {far_low, far_high},
+                {mad_low, mad_high}, {elsewhere, elsewhere},           {zero, beyond}};
     char *honest = core_path(folder, "honest.ipts");
     (void)state;
     make_raw(30000, 30000, 5);
@@ -448,7 +465,7 @@ static void one_point_is_a_dataset(void **state)
         static const double places[2][3] = {{0, 0, 0}, {1e7, -0.1, 1e-9}};
         memcpy(world[0], places[k], sizeof places[k]);
         char *path = scan_path("one.xyz");
-        if (k) core_text_write(path, (const double (*)[3])world, 1);
+        if (k) core_text_write(path, (const double(*)[3])world, 1);
         else write_ply("one.ply", 1);
         free(path);
         build_good(&defaults, NULL);
@@ -467,7 +484,8 @@ static void many_points_at_one_position_are_all_kept(void **state)
     points wanted = {0};
     (void)state;
     memset(raw, 0, sizeof raw);
-    for (uint32_t i = 0; i < 10; i++) raw[i][0] = (int32_t)i;
+    for (uint32_t i = 0; i < 10; i++)
+        raw[i][0] = (int32_t)i;
     write_las("a.las", 50000, &millimetres);
     add_las_points(&wanted, 50000, &millimetres, 0);
     build_good(&defaults, NULL);
@@ -503,7 +521,8 @@ static void points_that_are_not_finite_are_dropped_and_counted(void **state)
     prep_build_result result;
     (void)state;
     make_world(1000, (const double[3]){0, 0, 0}, 10, 4);
-    for (uint32_t i = 0; i < 1000; i += 10) world[i][i / 10 % 3] = i % 20 ? NAN : -INFINITY;
+    for (uint32_t i = 0; i < 1000; i += 10)
+        world[i][i / 10 % 3] = i % 20 ? NAN : -INFINITY;
     world[5][1] = 1e300;
     write_ply("a.ply", 1000);
     build_good(&defaults, &result);
@@ -549,8 +568,10 @@ static void bad_files_are_left_out_and_the_good_ones_built(void **state)
     assert_int_equal(result.metadata.source_count, 3);
     assert_null(result.metadata.sources[0].damage);
     assert_non_null(result.metadata.sources[1].damage);
-    assert_ptr_equal(strstr(result.metadata.sources[1].damage, "3-cut.las: "), result.metadata.sources[1].damage);
-    assert_null(strstr(result.metadata.sources[1].damage, folder)); /* a dataset does not say where it was made */
+    assert_ptr_equal(strstr(result.metadata.sources[1].damage, "3-cut.las: "),
+                     result.metadata.sources[1].damage);
+    assert_null(strstr(result.metadata.sources[1].damage,
+                       folder)); /* a dataset does not say where it was made */
     assert_holds(output, &wanted, 0);
     prep_build_result_fini(&result);
     free(wanted.at);
@@ -603,7 +624,7 @@ static void stopping_at_any_moment_leaves_nothing_behind(void **state)
     write_las("a.las", 30000, &millimetres);
     make_world(30000, millimetres.offset, 100, 1);
     char *path = scan_path("b.xyz");
-    core_text_write(path, (const double (*)[3])world, 30000);
+    core_text_write(path, (const double(*)[3])world, 30000);
     free(path);
     uint32_t before = core_entries(folder);
     for (uint32_t n = 0;; n = n < 20 ? n + 1 : n * 2) {
@@ -641,7 +662,8 @@ static void an_output_that_exists_is_replaced_only_by_force(void **state)
     /* A forced build that is stopped keeps the old one. */
     for (uint32_t n = 0; n < 2; n++) {
         countdown c = {n};
-        build_fails(&(prep_build_options){.force = true, .progress = count_down, .context = &c}, MOSPT_ECANCELLED, NULL);
+        build_fails(&(prep_build_options){.force = true, .progress = count_down, .context = &c},
+                    MOSPT_ECANCELLED, NULL);
         assert_holds(output, &first, 0);
     }
     uint32_t before = core_entries(folder);
@@ -680,7 +702,8 @@ static void force_touches_nothing_but_the_output(void **state)
 
 static void an_output_whose_name_ends_in_new_is_like_any_other(void **state)
 {
-    char *fresh = core_path(folder, "site.new"), *site = core_path(folder, "site"), *note = core_path(site, "note");
+    char *fresh = core_path(folder, "site.new"), *site = core_path(folder, "site"),
+         *note = core_path(site, "note");
     (void)state;
     make_raw(2000, 20000, 1);
     write_las("a.las", 2000, &millimetres);
@@ -770,7 +793,7 @@ static void a_full_disk_is_an_error_and_leaves_nothing_behind(void **state)
     write_las("a.las", 30000, &millimetres);
     make_world(2000, millimetres.offset, 100, 1);
     char *path = scan_path("b.xyz");
-    core_text_write(path, (const double (*)[3])world, 2000);
+    core_text_write(path, (const double(*)[3])world, 2000);
     free(path);
     build_good(&defaults, NULL);
     size_t size;

@@ -1,4 +1,5 @@
-/* A dataset that opens is consistent, and `check` finds whatever else is wrong with it: no byte can be lost or changed. */
+/* A dataset that opens is consistent, and `check` finds whatever else is wrong with it: no byte can
+ * be lost or changed. */
 #include "tests/core_tools.h"
 
 #include "mospt/hash.h"
@@ -47,7 +48,8 @@ static int set_up(void **state)
 static int tear_down(void **state)
 {
     (void)state;
-    for (size_t f = 0; f < file_count; f++) free(files[f].path), free(files[f].bytes);
+    for (size_t f = 0; f < file_count; f++)
+        free(files[f].path), free(files[f].bytes);
     core_site_fini(&site);
     core_folder_remove(folder);
     free(dataset_path);
@@ -66,7 +68,8 @@ static void every_truncation_of_every_file_is_found(void **state)
         for (size_t n = 0; n < files[f].size; n++) {
             mospt_err first;
             core_file_write(files[f].path, files[f].bytes, n);
-            if (core_findings(dataset_path, &first) == 0) fail_msg("%s cut to %zu bytes is not found", files[f].path, n);
+            if (core_findings(dataset_path, &first) == 0)
+                fail_msg("%s cut to %zu bytes is not found", files[f].path, n);
             assert_true(first.file[0] != '\0');
         }
         restore(f);
@@ -81,12 +84,14 @@ static void every_changed_byte_of_every_file_is_found(void **state)
     for (size_t f = 0; f < file_count; f++) {
         for (size_t i = 0; i < files[f].size; i++)
             for (int k = 0; k < 3; k++) {
-                uint32_t bits = k == 0 ? 1u << core_below(&random, 8) : 1 + core_below(&random, 255);
+                uint32_t bits =
+                    k == 0 ? 1u << core_below(&random, 8) : 1 + core_below(&random, 255);
                 uint8_t change = (uint8_t)bits, old = files[f].bytes[i];
                 mospt_err first;
                 files[f].bytes[i] ^= change;
                 restore(f);
-                if (core_findings(dataset_path, &first) == 0) fail_msg("%s: byte %zu changed by %02x is not found", files[f].path, i, change);
+                if (core_findings(dataset_path, &first) == 0)
+                    fail_msg("%s: byte %zu changed by %02x is not found", files[f].path, i, change);
                 files[f].bytes[i] = old;
             }
         restore(f);
@@ -116,7 +121,8 @@ static void every_appended_byte_is_found(void **state)
         memcpy(longer, files[f].bytes, files[f].size);
         for (size_t more = 1; more <= 3; more++) {
             core_file_write(files[f].path, longer, files[f].size + more);
-            if (core_findings(dataset_path, NULL) == 0) fail_msg("%zu bytes more in %s are not found", more, files[f].path);
+            if (core_findings(dataset_path, NULL) == 0)
+                fail_msg("%zu bytes more in %s are not found", more, files[f].path);
         }
         free(longer);
         restore(f);
@@ -160,7 +166,8 @@ static void what_is_read_is_what_was_put_in(void **state)
     mospt_dataset_close(NULL);
 }
 
-/* Writes the small dataset with something wrong in what the writer is told: all checksums of files are right then. */
+/* Writes the small dataset with something wrong in what the writer is told: all checksums of files
+ * are right then. */
 typedef struct {
     void (*node)(mospt_node *node, uint32_t index);
     void (*payload)(uint8_t *payload, mospt_node *node, uint32_t index);
@@ -185,7 +192,8 @@ static uint64_t findings_of(const liar *l, mospt_err *first)
         if (l->payload != NULL) {
             l->payload(payload, n, i);
             n->vertices_hash = mospt_hash(payload, n->count * sizeof(mospt_vertex));
-            n->attributes_hash = mospt_hash(payload + n->count * sizeof(mospt_vertex), n->count * (size_t)site.schema.row_size);
+            n->attributes_hash = mospt_hash(payload + n->count * sizeof(mospt_vertex),
+                                            n->count * (size_t)site.schema.row_size);
         }
         if (l->node != NULL) l->node(n, i);
         CORE_NEED(mospt_writer_append(writer, n, payload, &err));
@@ -203,14 +211,38 @@ static uint64_t findings_of(const liar *l, mospt_err *first)
     return findings;
 }
 
-static void node_vertices_hash(mospt_node *n, uint32_t i) { n->vertices_hash += i == 1; }
-static void node_attributes_hash(mospt_node *n, uint32_t i) { n->attributes_hash += i == 1; }
-static void node_payload_size(mospt_node *n, uint32_t i) { n->payload_size -= i == 0; }
-static void node_level_end(mospt_node *n, uint32_t i) { n->level_end[1] -= i == 0; }
-static void node_count(mospt_node *n, uint32_t i) { n->count += i == 2, n->level_end[DEPTH + 1] += i == 2; }
-static void payload_colour(uint8_t *p, mospt_node *n, uint32_t i) { (void)n, p[12] ^= i == 1; }
-static void payload_place(uint8_t *p, mospt_node *n, uint32_t i) { (void)n, p[2] ^= i == 1 ? 1 : 0; }
-static void payload_scan(uint8_t *p, mospt_node *n, uint32_t i) { p[n->count * sizeof(mospt_vertex) + 1] ^= i == 1; }
+static void node_vertices_hash(mospt_node *n, uint32_t i)
+{
+    n->vertices_hash += i == 1;
+}
+static void node_attributes_hash(mospt_node *n, uint32_t i)
+{
+    n->attributes_hash += i == 1;
+}
+static void node_payload_size(mospt_node *n, uint32_t i)
+{
+    n->payload_size -= i == 0;
+}
+static void node_level_end(mospt_node *n, uint32_t i)
+{
+    n->level_end[1] -= i == 0;
+}
+static void node_count(mospt_node *n, uint32_t i)
+{
+    n->count += i == 2, n->level_end[DEPTH + 1] += i == 2;
+}
+static void payload_colour(uint8_t *p, mospt_node *n, uint32_t i)
+{
+    (void)n, p[12] ^= i == 1;
+}
+static void payload_place(uint8_t *p, mospt_node *n, uint32_t i)
+{
+    (void)n, p[2] ^= i == 1 ? 1 : 0;
+}
+static void payload_scan(uint8_t *p, mospt_node *n, uint32_t i)
+{
+    p[n->count * sizeof(mospt_vertex) + 1] ^= i == 1;
+}
 static void payload_swap(uint8_t *p, mospt_node *n, uint32_t i)
 {
     uint8_t swap[16], *a = p + 16 * (n->level_end[0]), *b = p + 16 * (n->level_end[1] - 1);
@@ -223,19 +255,43 @@ static void payload_swap_first(uint8_t *p, mospt_node *n, uint32_t i)
     if (i > 0) return;
     memcpy(swap, p, 16), memcpy(p, b, 16), memcpy(b, swap, 16);
 }
-static void metadata_hash(mospt_metadata *m) { m->points_hash++; }
-static void metadata_low(mospt_metadata *m) { m->low[1] -= 0.001; }
-static void metadata_high(mospt_metadata *m) { m->high[2] += 0.001; }
-static void metadata_source(mospt_metadata *m) { m->sources[0].points--, m->sources[1].points++; }
+static void metadata_hash(mospt_metadata *m)
+{
+    m->points_hash++;
+}
+static void metadata_low(mospt_metadata *m)
+{
+    m->low[1] -= 0.001;
+}
+static void metadata_high(mospt_metadata *m)
+{
+    m->high[2] += 0.001;
+}
+static void metadata_source(mospt_metadata *m)
+{
+    m->sources[0].points--, m->sources[1].points++;
+}
 static void metadata_fewer_sources(mospt_metadata *m)
 {
     mospt_source *s = &m->sources[--m->source_count];
     free(s->name), free(s->scan), free(s->format);
 }
-static void metadata_threshold(mospt_metadata *m) { m->add_threshold += 1000; }
-static void metadata_low_threshold(mospt_metadata *m) { m->add_threshold = 2; }
-static void metadata_root(mospt_metadata *m) { m->grid.root[0] ^= 1u << m->grid.bits; }
-static void metadata_schema(mospt_metadata *m) { m->schema.at[1].type = MOSPT_U16, m->schema.row_size -= 2; }
+static void metadata_threshold(mospt_metadata *m)
+{
+    m->add_threshold += 1000;
+}
+static void metadata_low_threshold(mospt_metadata *m)
+{
+    m->add_threshold = 2;
+}
+static void metadata_root(mospt_metadata *m)
+{
+    m->grid.root[0] ^= 1u << m->grid.bits;
+}
+static void metadata_schema(mospt_metadata *m)
+{
+    m->schema.at[1].type = MOSPT_U16, m->schema.row_size -= 2;
+}
 
 static void a_liar_with_the_right_checksums_is_found(void **state)
 {
@@ -268,7 +324,8 @@ static void a_liar_with_the_right_checksums_is_found(void **state)
     assert_int_equal(findings_of(&truth, NULL), 0);
     for (size_t k = 0; k < sizeof lies / sizeof lies[0]; k++) {
         uint64_t findings = findings_of(&lies[k].lie, NULL);
-        if (findings == 0 && !lies[k].lie.refused) fail_msg("a wrong %s is not found", lies[k].name);
+        if (findings == 0 && !lies[k].lie.refused)
+            fail_msg("a wrong %s is not found", lies[k].name);
     }
 }
 
@@ -322,9 +379,11 @@ static void a_writer_refuses_what_it_must_not_overwrite(void **state)
     CORE_FAILS(mospt_writer_create(dataset_path, DEPTH, &writer, &err), MOSPT_EINVAL);
     assert_int_equal(core_findings(dataset_path, NULL), 0);
 
-    /* A folder with somebody's things: nothing in it is touched, in whatever order they are listed. */
-    static const char *const theirs[] = {"notes.txt", "hierarchy-1.jpg", "hierarchy-000001.bin.bak", "points-3.binary",
-                                         "points-1.bin", "points-00.bin.old", "metadata.json.old", ".hidden"};
+    /* A folder with somebody's things: nothing in it is touched, in whatever order they are listed.
+     */
+    static const char *const theirs[] = {
+        "notes.txt",    "hierarchy-1.jpg",   "hierarchy-000001.bin.bak", "points-3.binary",
+        "points-1.bin", "points-00.bin.old", "metadata.json.old",        ".hidden"};
     for (size_t k = 0; k < 2 * sizeof theirs / sizeof theirs[0]; k++) {
         const char *names[3] = {"points-00.bin", "hierarchy-000001.bin", theirs[k / 2]};
         char *other = core_path(folder, "other");
@@ -342,7 +401,8 @@ static void a_writer_refuses_what_it_must_not_overwrite(void **state)
 
 static void a_writer_takes_over_what_a_killed_build_left(void **state)
 {
-    static const char *const names[] = {"points-00.bin", "points-17.bin", "hierarchy-000001.bin", "hierarchy-000001.bin.new", "metadata.json.new"};
+    static const char *const names[] = {"points-00.bin", "points-17.bin", "hierarchy-000001.bin",
+                                        "hierarchy-000001.bin.new", "metadata.json.new"};
     char *left = core_path(folder, "left.ipts");
     mospt_writer *writer = NULL;
     mospt_err err = {0};

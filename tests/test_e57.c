@@ -428,8 +428,10 @@ static void invalid_colours_and_intensities_are_not_shown(void **state)
     const uint8_t *color_invalid = e57_plane(&l, "color_invalid", MOSPT_U8, 1);
     for (uint32_t i = 0; i < E57_COUNT; i++) {
         const uint8_t *p = l.batch.rgbi + 4 * i;
-        int shown = other[i] ? 255 : p[3]; /* intensity is stretched, by no more than its range wants */
-        assert_in_range(p[3] + 8, other[i] ? 263 : (int)e57_v.number[0][i], other[i] ? 263 : (int)e57_v.number[0][i] + 16);
+        int shown =
+            other[i] ? 255 : p[3]; /* intensity is stretched, by no more than its range wants */
+        assert_in_range(p[3] + 8, other[i] ? 263 : (int)e57_v.number[0][i],
+                        other[i] ? 263 : (int)e57_v.number[0][i] + 16);
         assert_int_equal(p[1], e57_v.flag[i] ? shown : (int)e57_v.number[1][i]);
         assert_int_equal(color_invalid[i], e57_v.flag[i]);
     }

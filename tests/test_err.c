@@ -9,7 +9,8 @@ static void text_names_file_and_place(void **state)
     mospt_err err;
     char text[256];
     (void)state;
-    assert_false(mospt_err_set(&err, MOSPT_EFORMAT, mospt_at_byte("a.las", UINT64_C(18234000000)), "claims %d bytes", 26));
+    assert_false(mospt_err_set(&err, MOSPT_EFORMAT, mospt_at_byte("a.las", UINT64_C(18234000000)),
+                               "claims %d bytes", 26));
     mospt_err_text(&err, text, sizeof text);
     assert_string_equal(text, "a.las: byte 18234000000: claims 26 bytes");
     mospt_err_set(&err, MOSPT_EFORMAT, mospt_at_line("a.xyz", 7), "is no number");

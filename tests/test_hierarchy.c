@@ -23,8 +23,10 @@ static int set_up(void **state)
     core_site_make(CORE_CLUSTERED, 12, 3000, 8, &site);
     prep_shape shape = core_shape(&site, DEPTH, 20);
     CORE_NEED(prep_solve(&shape, site.grid.root, 0, site.records, site.count, &made, &err));
-    good = (mospt_hierarchy){.nodes = malloc(made.node_count * sizeof(mospt_node)), .count = made.node_count,
-                             .inner_depth = DEPTH, .refinement = MOSPT_REFINE_ADD};
+    good = (mospt_hierarchy){.nodes = malloc(made.node_count * sizeof(mospt_node)),
+                             .count = made.node_count,
+                             .inner_depth = DEPTH,
+                             .refinement = MOSPT_REFINE_ADD};
     assert_non_null(good.nodes);
     memcpy(good.nodes, made.nodes, made.node_count * sizeof(mospt_node));
     CORE_NEED(mospt_hierarchy_link(&good, &site.grid, &err));
@@ -73,7 +75,8 @@ static void every_truncation_is_a_format_error(void **state)
         core_file_write(path, bytes, cut);
         CORE_FAILS(mospt_hierarchy_read(path, &site.grid, size, hash, &back, &err), MOSPT_EFORMAT);
         /* also if metadata.json agrees with what is left */
-        CORE_FAILS(mospt_hierarchy_read(path, &site.grid, cut, mospt_hash(bytes, cut), &back, &err), MOSPT_EFORMAT);
+        CORE_FAILS(mospt_hierarchy_read(path, &site.grid, cut, mospt_hash(bytes, cut), &back, &err),
+                   MOSPT_EFORMAT);
     }
     free(bytes);
 }
@@ -91,9 +94,12 @@ static void every_header_byte_is_checked(void **state)
         for (int bit = 0; bit < 8; bit++) {
             bytes[i] ^= (uint8_t)(1 << bit);
             core_file_write(path, bytes, n);
-            CORE_FAILS(mospt_hierarchy_read(path, &site.grid, size, hash, &back, &err), MOSPT_EFORMAT);
+            CORE_FAILS(mospt_hierarchy_read(path, &site.grid, size, hash, &back, &err),
+                       MOSPT_EFORMAT);
             /* and by a liar with the right checksum */
-            CORE_FAILS(mospt_hierarchy_read(path, &site.grid, size, mospt_hash(bytes, n), &back, &err), MOSPT_EFORMAT);
+            CORE_FAILS(
+                mospt_hierarchy_read(path, &site.grid, size, mospt_hash(bytes, n), &back, &err),
+                MOSPT_EFORMAT);
             bytes[i] ^= (uint8_t)(1 << bit);
         }
     free(bytes);
@@ -110,7 +116,8 @@ static void any_change_of_a_record_gives_an_error_or_a_valid_hierarchy(void **st
     for (int k = 0; k < 3000; k++) {
         size_t at = 64 + core_below(&random, (uint32_t)n - 64), times = 1 + core_below(&random, 3);
         uint8_t before[4];
-        for (size_t t = 0; t < times; t++) before[t] = bytes[(at + t) % n], bytes[(at + t) % n] = (uint8_t)core_random(&random);
+        for (size_t t = 0; t < times; t++)
+            before[t] = bytes[(at + t) % n], bytes[(at + t) % n] = (uint8_t)core_random(&random);
         core_file_write(path, bytes, n);
         mospt_hierarchy back;
         if (mospt_hierarchy_read(path, &site.grid, size, mospt_hash(bytes, n), &back, &err)) {
@@ -120,7 +127,8 @@ static void any_change_of_a_record_gives_an_error_or_a_valid_hierarchy(void **st
             assert_int_equal(err.code, MOSPT_EFORMAT);
             assert_string_equal(err.file, path);
         }
-        for (size_t t = times; t-- > 0;) bytes[(at + t) % n] = before[t];
+        for (size_t t = times; t-- > 0;)
+            bytes[(at + t) % n] = before[t];
     }
     free(bytes);
 }
@@ -142,26 +150,29 @@ static void reserved_bytes_of_records_must_be_zero(void **state)
             assert_int_equal(*byte, 0);
             *byte = 1;
             core_file_write(path, bytes, n);
-            CORE_FAILS(mospt_hierarchy_read(path, &site.grid, size, mospt_hash(bytes, n), &back, &err), MOSPT_EFORMAT);
+            CORE_FAILS(
+                mospt_hierarchy_read(path, &site.grid, size, mospt_hash(bytes, n), &back, &err),
+                MOSPT_EFORMAT);
             *byte = 0;
         }
     free(bytes);
 }
 
 /* Calls a change on a copy of the nodes, and expects that it is found. */
-#define CHANGE(statement)                                                                                               \
-    do {                                                                                                                \
-        mospt_hierarchy bad = good;                                                                                     \
-        bad.nodes = malloc(good.count * sizeof(mospt_node));                                                            \
-        assert_non_null(bad.nodes);                                                                                     \
-        memcpy(bad.nodes, good.nodes, good.count * sizeof(mospt_node));                                                 \
-        mospt_node *node = &bad.nodes[i];                                                                               \
-        statement;                                                                                                      \
-        mospt_err err = {0};                                                                                            \
-        if (mospt_hierarchy_is_valid(&bad, &site.grid, &err)) fail_msg("node %u of %u: %s", i, good.count, #statement); \
-        assert_int_equal(err.code, MOSPT_EFORMAT);                                                                      \
-        (void)node;                                                                                                     \
-        free(bad.nodes);                                                                                                \
+#define CHANGE(statement)                                                                          \
+    do {                                                                                           \
+        mospt_hierarchy bad = good;                                                                \
+        bad.nodes = malloc(good.count * sizeof(mospt_node));                                       \
+        assert_non_null(bad.nodes);                                                                \
+        memcpy(bad.nodes, good.nodes, good.count * sizeof(mospt_node));                            \
+        mospt_node *node = &bad.nodes[i];                                                          \
+        statement;                                                                                 \
+        mospt_err err = {0};                                                                       \
+        if (mospt_hierarchy_is_valid(&bad, &site.grid, &err))                                      \
+            fail_msg("node %u of %u: %s", i, good.count, #statement);                              \
+        assert_int_equal(err.code, MOSPT_EFORMAT);                                                 \
+        (void)node;                                                                                \
+        free(bad.nodes);                                                                           \
     } while (0)
 
 static void every_field_of_every_node_is_checked(void **state)
@@ -177,10 +188,12 @@ static void every_field_of_every_node_is_checked(void **state)
         CHANGE(node->level--);
         for (int o = 0; o < 8; o++) {
             CHANGE(node->child_mask ^= (uint8_t)(1 << o));
-            CHANGE((node->child_mask ^= (uint8_t)(1 << o), node->child_count = (uint8_t)__builtin_popcount(node->child_mask)));
+            CHANGE((node->child_mask ^= (uint8_t)(1 << o),
+                    node->child_count = (uint8_t)__builtin_popcount(node->child_mask)));
         }
         uint8_t mask = good.nodes[i].child_mask;
-        if (mask != 0 && mask != 0xff) CHANGE(node->child_mask = (uint8_t)(node->child_mask << 1 | node->child_mask >> 7));
+        if (mask != 0 && mask != 0xff)
+            CHANGE(node->child_mask = (uint8_t)(node->child_mask << 1 | node->child_mask >> 7));
         CHANGE(node->child_count++);
         CHANGE(node->child_count--);
         CHANGE(node->first_child++);
@@ -252,8 +265,10 @@ static void nodes_stand_in_morton_order_by_level(void **state)
         const mospt_node *a = &good.nodes[i - 1], *b = &good.nodes[i];
         assert_true(a->level <= b->level);
         if (a->level != b->level) continue;
-        uint64_t x = mospt_cell_code(a->corner[0], a->corner[1], a->corner[2], site.grid.bits, a->level);
-        uint64_t y = mospt_cell_code(b->corner[0], b->corner[1], b->corner[2], site.grid.bits, b->level);
+        uint64_t x =
+            mospt_cell_code(a->corner[0], a->corner[1], a->corner[2], site.grid.bits, a->level);
+        uint64_t y =
+            mospt_cell_code(b->corner[0], b->corner[1], b->corner[2], site.grid.bits, b->level);
         assert_true(x < y);
     }
 }
@@ -289,7 +304,8 @@ static void a_hierarchy_without_a_node_is_left_out(void **state)
         bad.nodes = malloc(good.count * sizeof(mospt_node));
         assert_non_null(bad.nodes);
         memcpy(bad.nodes, good.nodes, gone * sizeof(mospt_node));
-        memcpy(bad.nodes + gone, good.nodes + gone + 1, (good.count - gone - 1) * sizeof(mospt_node));
+        memcpy(bad.nodes + gone, good.nodes + gone + 1,
+               (good.count - gone - 1) * sizeof(mospt_node));
         bad.count--;
         CORE_FAILS(mospt_hierarchy_link(&bad, &site.grid, &err), MOSPT_EFORMAT);
         free(bad.nodes);
@@ -301,12 +317,15 @@ static void codes_agree_with_the_bits_of_the_coordinates(void **state)
     uint64_t random = 9;
     (void)state;
     for (int k = 0; k < 20000; k++) {
-        uint32_t bits = core_below(&random, 33), depth = core_below(&random, MOSPT_CODE_LEVELS + 1), g[3];
-        for (int a = 0; a < 3; a++) g[a] = (uint32_t)core_random(&random);
+        uint32_t bits = core_below(&random, 33), depth = core_below(&random, MOSPT_CODE_LEVELS + 1),
+                 g[3];
+        for (int a = 0; a < 3; a++)
+            g[a] = (uint32_t)core_random(&random);
         uint64_t code = 0;
         for (uint32_t level = 0; level < depth; level++) {
             code <<= 3;
-            for (uint32_t a = 0; a < 3 && level < bits; a++) code |= (uint64_t)(g[a] >> (bits - 1 - level) & 1) << a;
+            for (uint32_t a = 0; a < 3 && level < bits; a++)
+                code |= (uint64_t)(g[a] >> (bits - 1 - level) & 1) << a;
         }
         assert_true(mospt_cell_code(g[0], g[1], g[2], bits, depth) == code);
     }

@@ -1,4 +1,5 @@
-/* tests/test_inspect.c - what a scan file says of itself, and whether that is noticed where it is not true. */
+/* tests/test_inspect.c - what a scan file says of itself, and whether that is noticed where it is
+ * not true. */
 #include "core_scans.h"
 #include "core_tools.h"
 
@@ -23,7 +24,10 @@ static void points_are_counted_and_measured(void **state)
 {
     (void)state;
     prep_inspection in;
-    look(&(core_las){.scale = {0.001, 0.001, 0.001}, .offset = {10, 20, 30}, .xyz = points, .count = 3}, &in);
+    look(
+        &(core_las){
+            .scale = {0.001, 0.001, 0.001}, .offset = {10, 20, 30}, .xyz = points, .count = 3},
+        &in);
     assert_true(in.was_read);
     assert_int_equal(in.points, 3);
     for (int a = 0; a < 3; a++) {
@@ -39,7 +43,13 @@ static void bounds_that_lie_are_noted(void **state)
     (void)state;
     prep_inspection in;
     const double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
-    look(&(core_las){.scale = {0.001, 0.001, 0.001}, .offset = {10, 20, 30}, .xyz = points, .count = 3, .low = low, .high = high}, &in);
+    look(&(core_las){.scale = {0.001, 0.001, 0.001},
+                     .offset = {10, 20, 30},
+                     .xyz = points,
+                     .count = 3,
+                     .low = low,
+                     .high = high},
+         &in);
     assert_int_equal(in.note_count, 3);
     assert_non_null(strstr(in.notes[0], "x reaches from 0 to 0"));
 }

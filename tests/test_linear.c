@@ -20,12 +20,15 @@ static built build(const core_site *site, uint32_t depth, uint32_t code_levels)
     built b = {.order = malloc((n + 1) * sizeof *b.order)};
     mospt_linear_key *keys = malloc(2 * (n + 1) * sizeof *keys);
     void *work = malloc(mospt_linear_work_size(n) + 1);
-    mospt_linear_input input = {.records = site->records, .stride = site->stride, .depth = depth,
+    mospt_linear_input input = {.records = site->records,
+                                .stride = site->stride,
+                                .depth = depth,
                                 .code_shift = 3 * (code_levels - depth)};
     assert_true(b.order != NULL && keys != NULL && work != NULL);
     for (uint32_t i = 0; i < n; i++) {
         mospt_vertex v = mospt_vertex_of(site->records + i * site->stride);
-        keys[i] = (mospt_linear_key){mospt_cell_code(v.x, v.y, v.z, site->grid.bits, code_levels), i};
+        keys[i] =
+            (mospt_linear_key){mospt_cell_code(v.x, v.y, v.z, site->grid.bits, code_levels), i};
     }
     prep_sort_keys(keys, keys + n, n);
     mospt_linear_build(&input, keys, n, work, b.order, b.level_end);
@@ -39,7 +42,8 @@ static void assert_like_twin(const core_site *site, uint32_t depth)
     const uint8_t **order = malloc((site->count + 1) * sizeof *order);
     uint32_t level_end[MOSPT_LEVELS_MAX];
     assert_non_null(order);
-    for (uint32_t i = 0; i < site->count; i++) assert_true(ref_mospt_insert(m, site->records + i * site->stride, false));
+    for (uint32_t i = 0; i < site->count; i++)
+        assert_true(ref_mospt_insert(m, site->records + i * site->stride, false));
     ref_mospt_finish(m, order, level_end);
     const uint32_t code_levels[] = {depth, depth + 3, MOSPT_CODE_LEVELS};
     for (int k = 0; k < 3; k++) {
@@ -77,7 +81,8 @@ static void few_points_are_ordered_like_the_octree_of_pointers(void **state)
         }
 }
 
-static void grids_coarser_or_finer_than_the_cells_are_ordered_like_the_octree_of_pointers(void **state)
+static void
+grids_coarser_or_finer_than_the_cells_are_ordered_like_the_octree_of_pointers(void **state)
 {
     static const uint32_t bits[] = {0, 1, 2, 7, 8, 9, 10, 31, 32};
     (void)state;
@@ -106,7 +111,8 @@ static void order_of_arrival_does_not_show(void **state)
         built x = build(&site, 3, 3), y = build(&shuffled, 3, 3);
         assert_memory_equal(x.level_end, y.level_end, 5 * sizeof(uint32_t));
         for (uint32_t i = 0; i < site.count; i++)
-            assert_memory_equal(site.records + x.order[i] * site.stride, shuffled.records + y.order[i] * site.stride, site.stride);
+            assert_memory_equal(site.records + x.order[i] * site.stride,
+                                shuffled.records + y.order[i] * site.stride, site.stride);
         free(x.order), free(y.order);
         core_site_fini(&site), core_site_fini(&shuffled);
     }
@@ -138,9 +144,11 @@ static void each_prefix_holds_one_point_of_each_occupied_cell(void **state)
 
 static void representative_is_the_child_nearest_to_the_average_colour(void **state)
 {
-    /* Eight points in the eight octants; averages by hand: red 0 10 ... 70, mean 35: 30 and 40 tie, the first one wins. */
+    /* Eight points in the eight octants; averages by hand: red 0 10 ... 70, mean 35: 30 and 40 tie,
+     * the first one wins. */
     mospt_vertex v[8];
-    core_site site = {.grid = {.step = 1, .bits = 1}, .stride = sizeof v[0], .count = 8, .records = (uint8_t *)v};
+    core_site site = {
+        .grid = {.step = 1, .bits = 1}, .stride = sizeof v[0], .count = 8, .records = (uint8_t *)v};
     (void)state;
     for (uint32_t i = 0; i < 8; i++)
         v[i] = (mospt_vertex){.x = i & 1, .y = i >> 1 & 1, .z = i >> 2, .r = (uint8_t)(10 * i)};
@@ -174,7 +182,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_kind_of_points_is_ordered_like_the_octree_of_pointers),
         cmocka_unit_test(few_points_are_ordered_like_the_octree_of_pointers),
-        cmocka_unit_test(grids_coarser_or_finer_than_the_cells_are_ordered_like_the_octree_of_pointers),
+        cmocka_unit_test(
+            grids_coarser_or_finer_than_the_cells_are_ordered_like_the_octree_of_pointers),
         cmocka_unit_test(order_of_arrival_does_not_show),
         cmocka_unit_test(each_prefix_holds_one_point_of_each_occupied_cell),
         cmocka_unit_test(representative_is_the_child_nearest_to_the_average_colour),

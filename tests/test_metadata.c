@@ -32,10 +32,24 @@ static int tear_down(void **state)
 static mospt_metadata make(const char *name)
 {
     mospt_metadata m = {
-        .generation = INT64_MAX, .inner_depth = 7, .add_threshold = 4096, .point_count = UINT64_C(123456789012345),
-        .points_hash = UINT64_C(0xfedcba9876543210), .position_error = 0.1 + 0.2, .low = {-1e-300, -0.1, 1.0 / 3}, .high = {1e15, 5, 1e7 + 0.001},
-        .source_count = 3, .file_count = 2, .hierarchy_name = "hierarchy-000001.bin", .hierarchy_size = 12345, .hierarchy_hash = 1,
-        .grid = {.offset = {500000.123, -1e7, 0}, .base = {INT64_MIN / 2, 5, INT64_MAX / 2}, .step = 0.001, .bits = 31, .root = {0x80000000, 0, 0}},
+        .generation = INT64_MAX,
+        .inner_depth = 7,
+        .add_threshold = 4096,
+        .point_count = UINT64_C(123456789012345),
+        .points_hash = UINT64_C(0xfedcba9876543210),
+        .position_error = 0.1 + 0.2,
+        .low = {-1e-300, -0.1, 1.0 / 3},
+        .high = {1e15, 5, 1e7 + 0.001},
+        .source_count = 3,
+        .file_count = 2,
+        .hierarchy_name = "hierarchy-000001.bin",
+        .hierarchy_size = 12345,
+        .hierarchy_hash = 1,
+        .grid = {.offset = {500000.123, -1e7, 0},
+                 .base = {INT64_MIN / 2, 5, INT64_MAX / 2},
+                 .step = 0.001,
+                 .bits = 31,
+                 .root = {0x80000000, 0, 0}},
     };
     mospt_err err = {0};
     m.crs = strdup("EPSG:25833 \"quoted\" \\ \n end");
@@ -46,13 +60,15 @@ static mospt_metadata make(const char *name)
     CORE_NEED(mospt_schema_add(&m.schema, name, MOSPT_I64, 255, &err));
     for (uint32_t i = 0; i < 3; i++) {
         mospt_source *s = &m.sources[i];
-        s->name = strdup(name), s->scan = strdup(i ? name : ""), s->format = strdup("text, 7 columns");
+        s->name = strdup(name), s->scan = strdup(i ? name : ""),
+        s->format = strdup("text, 7 columns");
         s->points = i * 1000, s->has_rgb = i & 1, s->has_intensity = !(i & 1);
         s->low[i] = -i / 3.0, s->high[i] = 1e9 / 7;
         if (i == 1) {
             s->damage = strdup("scan_07.las: byte 18234: \x01 record claims\t26 bytes");
             s->has_pose = true;
-            for (int k = 0; k < 16; k++) s->pose[k] = sqrt(k) - 2;
+            for (int k = 0; k < 16; k++)
+                s->pose[k] = sqrt(k) - 2;
             s->reason_count = 2;
             s->drop_reason[0] = strdup("not finite"), s->drop_count[0] = 17;
             s->drop_reason[1] = strdup("no return"), s->drop_count[1] = UINT64_C(1) << 40;
@@ -66,11 +82,13 @@ static mospt_metadata make(const char *name)
 
 static void assert_same(const mospt_metadata *a, const mospt_metadata *b, const char *name)
 {
-    assert_true(a->generation == b->generation && a->point_count == b->point_count && a->points_hash == b->points_hash);
+    assert_true(a->generation == b->generation && a->point_count == b->point_count &&
+                a->points_hash == b->points_hash);
     assert_memory_equal(&a->grid, &b->grid, sizeof a->grid);
     assert_int_equal(a->schema.count, b->schema.count);
     assert_int_equal(a->schema.row_size, b->schema.row_size);
-    for (uint32_t k = 0; k < 2; k++) assert_string_equal(a->schema.at[k].name, b->schema.at[k].name);
+    for (uint32_t k = 0; k < 2; k++)
+        assert_string_equal(a->schema.at[k].name, b->schema.at[k].name);
     for (uint32_t k = 0; k < 3; k++) {
         assert_int_equal(a->schema.at[k].type, b->schema.at[k].type);
         assert_int_equal(a->schema.at[k].components, b->schema.at[k].components);
@@ -95,12 +113,14 @@ static void assert_same(const mospt_metadata *a, const mospt_metadata *b, const 
         assert_string_equal(t->name, name);
         assert_string_equal(t->scan, i ? name : "");
         assert_string_equal(s->format, t->format);
-        assert_true(s->points == t->points && s->dropped == t->dropped && s->reason_count == t->reason_count);
+        assert_true(s->points == t->points && s->dropped == t->dropped &&
+                    s->reason_count == t->reason_count);
         for (uint32_t r = 0; r < s->reason_count; r++) {
             assert_string_equal(s->drop_reason[r], t->drop_reason[r]);
             assert_true(s->drop_count[r] == t->drop_count[r]);
         }
-        assert_true(s->has_rgb == t->has_rgb && s->has_intensity == t->has_intensity && s->has_pose == t->has_pose);
+        assert_true(s->has_rgb == t->has_rgb && s->has_intensity == t->has_intensity &&
+                    s->has_pose == t->has_pose);
         assert_true((s->damage == NULL) == (t->damage == NULL));
         if (s->damage != NULL) assert_string_equal(s->damage, t->damage);
         assert_memory_equal(s->pose, t->pose, sizeof s->pose);
@@ -130,9 +150,11 @@ static void what_is_written_is_read(void **state)
 static void odd_names_survive(void **state)
 {
     (void)state;
-    check_name("quote \" backslash \\ tab \t line\nend \x7f", "quote \" backslash \\ tab \t line\nend \x7f");
+    check_name("quote \" backslash \\ tab \t line\nend \x7f",
+               "quote \" backslash \\ tab \t line\nend \x7f");
     check_name("\x01\x02\x1f", "\x01\x02\x1f");
-    check_name("\xc3\xa4\xe6\xbc\xa2\xf0\x9f\x98\x80.las", "\xc3\xa4\xe6\xbc\xa2\xf0\x9f\x98\x80.las");
+    check_name("\xc3\xa4\xe6\xbc\xa2\xf0\x9f\x98\x80.las",
+               "\xc3\xa4\xe6\xbc\xa2\xf0\x9f\x98\x80.las");
     check_name("</script>{\"}],", "</script>{\"}],");
 }
 
@@ -189,12 +211,14 @@ static void write_signed(const char *text, size_t size)
     char *whole = malloc(size + TAIL + 1);
     assert_non_null(whole);
     memcpy(whole, text, size);
-    snprintf(whole + size, TAIL + 1, ",\n  \"checksum\": \"%016" PRIx64 "\"\n}\n", mospt_hash(text, size));
+    snprintf(whole + size, TAIL + 1, ",\n  \"checksum\": \"%016" PRIx64 "\"\n}\n",
+             mospt_hash(text, size));
     core_file_write(path, whole, size + TAIL);
     free(whole);
 }
 
-static char *replaced(const char *text, size_t size, const char *what, const char *with, size_t *new_size)
+static char *replaced(const char *text, size_t size, const char *what, const char *with,
+                      size_t *new_size)
 {
     const char *at = memmem(text, size, what, strlen(what));
     if (at == NULL) fail_msg("no %s in the text", what);
@@ -211,24 +235,54 @@ static char *replaced(const char *text, size_t size, const char *what, const cha
 static void a_liar_with_the_right_checksum_is_refused(void **state)
 {
     static const char *const lies[][2] = {
-        {"\"version\": 1", "\"version\": 2"}, {"\"version\": 1", "\"version\": \"1\""},
-        {"\"instantpoints dataset\"", "\"another dataset\""}, {"\"additive\"", "\"replacing\""}, {"\"additive\"", "7"},
-        {"\"inner_depth\": 7", "\"inner_depth\": 0"}, {"\"inner_depth\": 7", "\"inner_depth\": 10"},
-        {"\"inner_depth\": 7", "\"inner_depth\": -1"}, {"\"inner_depth\": 7", "\"inner_depth\": 7.5"},
-        {"\"inner_depth\": 7", "\"inner_depth\": null"}, {"\"points\": 123456789012345", "\"points\": 0"},
-        {"\"points\": 123456789012345", "\"points\": -1"}, {"\"points\": 123456789012345", "\"points\": 1e30"},
-        {"\"fedcba9876543210\"", "\"fedcba987654321\""}, {"\"fedcba9876543210\"", "\"gedcba9876543210\""},
-        {"\"fedcba9876543210\"", "5"}, {"\"add_threshold\": 4096", "\"add_threshold\": -4096"}, {"\"bits\": 31", "\"bits\": 33"},
-        {"\"bits\": 31", "\"bits\": 32"}, {"\"step\": 0.001", "\"step\": 0"}, {"\"step\": 0.001", "\"step\": -1.0"},
-        {"\"step\": 0.001", "\"step\": \"x\""}, {"2147483648", "4294967296"}, {"2147483648", "-1"}, {"2147483648", "1"},
-        {"\"points-00.bin\"", "\"../points-00.bin\""}, {"\"points-00.bin\"", "\"/etc/passwd\""}, {"\"points-00.bin\"", "null"},
-        {"\"hierarchy-000001.bin\"", "\"../h.bin\""}, {"\"hierarchy-000001.bin\"", "3"}, {"\"u16\"", "\"u17\""},
-        {"\"normal\"", "\"scan\""}, {"\"components\": 3", "\"components\": 0"}, {"\"components\": 3", "\"components\": 256"},
-        {"\"size\": 7", "\"size\": -7"}, {"\"size\": 12345", "\"size\": \"12345\""}, {"\"text, 7 columns\"", "[]"},
-        {"\"not finite\": 17", "\"not finite\": -1"}, {"\"not finite\": 17", "\"not finite\": \"many\""},
-        {"\"points\": 1000", "\"points\": -1000"}, {"\"generation\": 9223372036854775807", "\"generation\": 0"},
-        {"\"attributes\"", "\"attributed\""}, {"\"sources\"", "\"source\""}, {"\"payloads\"", "\"payload\""},
-        {"\"bounds\"", "\"bound\""}, {"\"grid\"", "\"grids\""}, {"\"crs\"", "\"csr\""}, {"\"position_error\"", "\"error\""},
+        {"\"version\": 1", "\"version\": 2"},
+        {"\"version\": 1", "\"version\": \"1\""},
+        {"\"instantpoints dataset\"", "\"another dataset\""},
+        {"\"additive\"", "\"replacing\""},
+        {"\"additive\"", "7"},
+        {"\"inner_depth\": 7", "\"inner_depth\": 0"},
+        {"\"inner_depth\": 7", "\"inner_depth\": 10"},
+        {"\"inner_depth\": 7", "\"inner_depth\": -1"},
+        {"\"inner_depth\": 7", "\"inner_depth\": 7.5"},
+        {"\"inner_depth\": 7", "\"inner_depth\": null"},
+        {"\"points\": 123456789012345", "\"points\": 0"},
+        {"\"points\": 123456789012345", "\"points\": -1"},
+        {"\"points\": 123456789012345", "\"points\": 1e30"},
+        {"\"fedcba9876543210\"", "\"fedcba987654321\""},
+        {"\"fedcba9876543210\"", "\"gedcba9876543210\""},
+        {"\"fedcba9876543210\"", "5"},
+        {"\"add_threshold\": 4096", "\"add_threshold\": -4096"},
+        {"\"bits\": 31", "\"bits\": 33"},
+        {"\"bits\": 31", "\"bits\": 32"},
+        {"\"step\": 0.001", "\"step\": 0"},
+        {"\"step\": 0.001", "\"step\": -1.0"},
+        {"\"step\": 0.001", "\"step\": \"x\""},
+        {"2147483648", "4294967296"},
+        {"2147483648", "-1"},
+        {"2147483648", "1"},
+        {"\"points-00.bin\"", "\"../points-00.bin\""},
+        {"\"points-00.bin\"", "\"/etc/passwd\""},
+        {"\"points-00.bin\"", "null"},
+        {"\"hierarchy-000001.bin\"", "\"../h.bin\""},
+        {"\"hierarchy-000001.bin\"", "3"},
+        {"\"u16\"", "\"u17\""},
+        {"\"normal\"", "\"scan\""},
+        {"\"components\": 3", "\"components\": 0"},
+        {"\"components\": 3", "\"components\": 256"},
+        {"\"size\": 7", "\"size\": -7"},
+        {"\"size\": 12345", "\"size\": \"12345\""},
+        {"\"text, 7 columns\"", "[]"},
+        {"\"not finite\": 17", "\"not finite\": -1"},
+        {"\"not finite\": 17", "\"not finite\": \"many\""},
+        {"\"points\": 1000", "\"points\": -1000"},
+        {"\"generation\": 9223372036854775807", "\"generation\": 0"},
+        {"\"attributes\"", "\"attributed\""},
+        {"\"sources\"", "\"source\""},
+        {"\"payloads\"", "\"payload\""},
+        {"\"bounds\"", "\"bound\""},
+        {"\"grid\"", "\"grids\""},
+        {"\"crs\"", "\"csr\""},
+        {"\"position_error\"", "\"error\""},
     };
     mospt_err err = {0};
     mospt_metadata m = make("n"), back;
@@ -243,7 +297,8 @@ static void a_liar_with_the_right_checksum_is_refused(void **state)
         char *lie = replaced(text, size - TAIL, lies[k][0], lies[k][1], &lie_size);
         write_signed(lie, lie_size);
         free(lie);
-        if (mospt_metadata_read(folder, &back, &err)) fail_msg("%s instead of %s is believed", lies[k][1], lies[k][0]);
+        if (mospt_metadata_read(folder, &back, &err))
+            fail_msg("%s instead of %s is believed", lies[k][1], lies[k][0]);
         assert_int_equal(err.code, MOSPT_EFORMAT);
         assert_string_equal(err.file, path);
     }
@@ -262,7 +317,8 @@ static void every_line_that_is_missing_or_changed_is_an_error_or_good_metadata(v
     char *text = (char *)core_file_read(path, &size), *copy = malloc(size);
     assert_non_null(copy);
     for (size_t a = 0, b; a < size - TAIL; a = b) {
-        for (b = a; b < size - TAIL && text[b] != '\n';) b++;
+        for (b = a; b < size - TAIL && text[b] != '\n';)
+            b++;
         b += b < size - TAIL;
         memcpy(copy, text, a);
         memcpy(copy + a, text + b, size - TAIL - b);

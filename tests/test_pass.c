@@ -1,4 +1,5 @@
-/* The multi-pass builder writes the same dataset as the builder in memory, whatever memory, levels, batches and threads. */
+/* The multi-pass builder writes the same dataset as the builder in memory, whatever memory, levels,
+ * batches and threads. */
 #include "tests/core_tools.h"
 
 #include "mospt/writer.h"
@@ -23,8 +24,9 @@ static bool go_on(void *context, const prep_written *written)
 }
 
 /* Builds the site; `reports_left` NULL: until the end. */
-static bool pass_build(const core_site *site, const prep_shape *shape, const way *w, const char *path, const char *scratch,
-                       uint32_t *reports_left, mospt_err *err)
+static bool pass_build(const core_site *site, const prep_shape *shape, const way *w,
+                       const char *path, const char *scratch, uint32_t *reports_left,
+                       mospt_err *err)
 {
     prep_workers *workers = NULL;
     prep_store *store = NULL;
@@ -33,12 +35,20 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     prep_written written = {0};
     mospt_metadata metadata;
     assert_true(prep_workers_create(w->threads, &workers, err));
-    assert_true(prep_store_create(scratch, site->stride, w->block_size, w->store_memory, &store, err));
+    assert_true(
+        prep_store_create(scratch, site->stride, w->block_size, w->store_memory, &store, err));
     assert_true(mospt_writer_create(path, shape->inner_depth, &writer, err));
     uint32_t block = prep_store_block_capacity(store);
-    prep_pass_env env = {.shape = shape, .workers = workers, .store = store, .writer = writer, .levels = w->levels,
-                         .batch_count = w->batch > block ? w->batch : block, .solve_memory = w->solve_memory,
-                         .written = &written, .report = go_on, .report_context = reports_left};
+    prep_pass_env env = {.shape = shape,
+                         .workers = workers,
+                         .store = store,
+                         .writer = writer,
+                         .levels = w->levels,
+                         .batch_count = w->batch > block ? w->batch : block,
+                         .solve_memory = w->solve_memory,
+                         .written = &written,
+                         .report = go_on,
+                         .report_context = reports_left};
     bool ok = prep_pass_begin(&env, site->grid.root, 0, &pass, err);
     for (uint32_t i = 0; ok && i < site->count; i += w->batch) {
         uint32_t n = site->count - i < w->batch ? site->count - i : w->batch;
@@ -75,7 +85,8 @@ static int tear_down(void **state)
     return 0;
 }
 
-static void check_ways(const core_site *site, uint32_t depth, uint32_t threshold, const way *ways, size_t way_count)
+static void check_ways(const core_site *site, uint32_t depth, uint32_t threshold, const way *ways,
+                       size_t way_count)
 {
     prep_shape shape = core_shape(site, depth, threshold);
     mospt_err err = {0};
@@ -94,10 +105,12 @@ static void check_ways(const core_site *site, uint32_t depth, uint32_t threshold
 }
 
 /* Every combination in which the parts of a pass meet each other, thinned by a fixed stride. */
-static void check_all_ways(const core_site *site, uint32_t depth, uint32_t threshold, uint32_t first, uint32_t stride)
+static void check_all_ways(const core_site *site, uint32_t depth, uint32_t threshold,
+                           uint32_t first, uint32_t stride)
 {
     static const size_t store[] = {0, 3000, 60000, 1 << 30}, solve[] = {0, 20000, 300000, 1 << 30};
-    static const uint32_t threads[] = {1, 2, 7}, batch[] = {1000, 20000, 333}, block[] = {64, 700, 1 << 16};
+    static const uint32_t threads[] = {1, 2, 7}, batch[] = {1000, 20000, 333},
+                          block[] = {64, 700, 1 << 16};
     for (uint32_t k = first; k < 4 * 4 * 3 * 3 * 3 * 3; k += stride) {
         uint32_t n = k;
         way w = {0};
@@ -175,7 +188,11 @@ static void piles_give_the_same_bytes(void **state)
         core_site_make(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 1, &site);
         const way ways[] = {
             {.levels = 3, .threads = 2, .batch = 65536, .block_size = 1 << 16},
-            {.levels = 1, .threads = 1, .batch = 50000, .block_size = 1 << 14, .store_memory = 1 << 20},
+            {.levels = 1,
+             .threads = 1,
+             .batch = 50000,
+             .block_size = 1 << 14,
+             .store_memory = 1 << 20},
         };
         check_ways(&site, 5, 100, ways, k == 1 ? 2 : 1);
         core_site_fini(&site);
@@ -192,7 +209,8 @@ static void stopping_at_any_report_is_a_cancellation(void **state)
     uint32_t reports = 0;
     for (uint32_t stop_after = 0;; stop_after = stop_after < 10 ? stop_after + 1 : stop_after * 3) {
         mospt_err err = {0};
-        way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000};
+        way w = {
+            .levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000};
         uint32_t left = stop_after;
         if (pass_build(&site, &shape, &w, got, folder, &left, &err)) break;
         assert_int_equal(err.code, MOSPT_ECANCELLED);

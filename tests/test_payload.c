@@ -12,11 +12,13 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
 {
     size_t stride = mospt_record_size(schema);
     uint64_t random = count;
-    uint8_t *records = malloc(record_count * stride + 1), *out = malloc(count * stride + 1), *picked = malloc(count * stride + 1);
+    uint8_t *records = malloc(record_count * stride + 1), *out = malloc(count * stride + 1),
+            *picked = malloc(count * stride + 1);
     uint32_t *order = malloc((count + 1) * sizeof *order);
     mospt_node node = {.level = 3};
     assert_true(records != NULL && out != NULL && order != NULL && picked != NULL);
-    for (size_t i = 0; i < record_count * stride; i++) records[i] = (uint8_t)core_random(&random);
+    for (size_t i = 0; i < record_count * stride; i++)
+        records[i] = (uint8_t)core_random(&random);
     for (uint32_t i = 0; i < count; i++) {
         order[i] = core_below(&random, record_count);
         memcpy(picked + i * stride, records + order[i] * stride, stride);
@@ -29,15 +31,18 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
     assert_int_equal(node.payload_size, count * stride);
     uint8_t *planes = out + count * sizeof(mospt_vertex);
     for (uint32_t i = 0; i < count; i++) {
-        assert_memory_equal(out + i * sizeof(mospt_vertex), picked + i * stride, sizeof(mospt_vertex));
+        assert_memory_equal(out + i * sizeof(mospt_vertex), picked + i * stride,
+                            sizeof(mospt_vertex));
         for (uint32_t k = 0; k < schema->count; k++) {
             size_t size = mospt_attribute_size(&schema->at[k]), at = schema->at[k].offset;
-            assert_memory_equal(planes + count * at + i * size, picked + i * stride + sizeof(mospt_vertex) + at, size);
+            assert_memory_equal(planes + count * at + i * size,
+                                picked + i * stride + sizeof(mospt_vertex) + at, size);
         }
     }
     assert_true(node.vertices_hash == mospt_hash(out, count * sizeof(mospt_vertex)));
     assert_true(node.attributes_hash == mospt_hash(planes, count * (size_t)schema->row_size));
-    assert_true(mospt_payload_points_hash(schema, out, planes, count) == mospt_hash_records(picked, stride, count));
+    assert_true(mospt_payload_points_hash(schema, out, planes, count) ==
+                mospt_hash_records(picked, stride, count));
     free(records), free(out), free(order), free(picked);
 }
 
@@ -81,8 +86,10 @@ static void the_sum_of_hashes_does_not_depend_on_the_order_but_on_every_byte(voi
     uint8_t records[50 * 18], back[50 * 18];
     uint64_t random = 1;
     (void)state;
-    for (size_t i = 0; i < sizeof records; i++) records[i] = (uint8_t)core_random(&random);
-    for (size_t i = 0; i < 50; i++) memcpy(back + i * 18, records + (49 - i) * 18, 18);
+    for (size_t i = 0; i < sizeof records; i++)
+        records[i] = (uint8_t)core_random(&random);
+    for (size_t i = 0; i < 50; i++)
+        memcpy(back + i * 18, records + (49 - i) * 18, 18);
     uint64_t sum = mospt_hash_records(records, 18, 50);
     assert_true(sum == mospt_hash_records(back, 18, 50));
     for (size_t i = 0; i < sizeof records; i++) {

@@ -16,7 +16,8 @@ static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, 
     assert_true(p->levels <= depth);
     assert_true(3 * (p->levels + depth - 1) <= 32); /* codes of a pass are 32 bits */
     assert_true(p->batch_count > 0 && p->block_size > 0 && p->solve_memory > 0);
-    uint64_t sum = prep_pass_cells_size(p->levels, depth) + buckets * (p->levels + 1) * p->block_size +
+    uint64_t sum = prep_pass_cells_size(p->levels, depth) +
+                   buckets * (p->levels + 1) * p->block_size +
                    (uint64_t)p->batch_count * 2 * record_size + p->solve_memory + p->store_memory;
     assert_true(sum <= memory);
 }
@@ -27,7 +28,8 @@ static void parts_never_sum_to_more_than_was_given(void **state)
     (void)state;
     for (uint64_t memory = 32 * MIB; memory <= 512 * 1024 * MIB; memory = memory * 5 / 4)
         for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= MOSPT_DEPTH_MAX; depth++)
-            for (size_t record = 16; record <= 16 + MOSPT_ROW_SIZE_MAX; record = record * 3 / 2 + 1) {
+            for (size_t record = 16; record <= 16 + MOSPT_ROW_SIZE_MAX;
+                 record = record * 3 / 2 + 1) {
                 prep_plan plan;
                 mospt_err err = {0};
                 if (!prep_plan_make(memory, record, depth, &plan, &err)) {
@@ -50,7 +52,8 @@ static void the_least_memory_is_enough_for_usual_points(void **state)
             mospt_err err = {0};
             CORE_NEED(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB, record, depth, &plan, &err));
             check_plan(&plan, PREP_MEMORY_MIN_MIB * MIB, record, depth);
-            CORE_FAILS(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB - 1, record, depth, &plan, &err), MOSPT_EINVAL);
+            CORE_FAILS(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB - 1, record, depth, &plan, &err),
+                       MOSPT_EINVAL);
         }
 }
 
@@ -85,7 +88,8 @@ static void a_block_of_a_spool_fits_a_batch(void **state)
         for (uint32_t depth = 1; depth <= MOSPT_DEPTH_MAX; depth++)
             for (size_t record = 16; record < 400; record += 13) {
                 prep_plan plan;
-                if (prep_plan_make(memory, record, depth, &plan, NULL)) assert_true(plan.block_size / record <= 65536);
+                if (prep_plan_make(memory, record, depth, &plan, NULL))
+                    assert_true(plan.block_size / record <= 65536);
             }
 }
 

@@ -16,7 +16,8 @@ static void write_text(const char *name, const char *text)
     free(path);
 }
 
-static bool find(const prep_pose_list *list, const char *name, bool *found, double m[16], mospt_err *err)
+static bool find(const prep_pose_list *list, const char *name, bool *found, double m[16],
+                 mospt_err *err)
 {
     char *path = core_path(folder, "%s", name);
     bool ok = prep_pose_find(list, path, "scan name", found, m, err);
@@ -51,9 +52,13 @@ static void a_sidecar_is_found_by_both_names(void **state)
 static void what_is_no_matrix_is_refused(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {
-        "", "1 2 3", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2", "1 0 0 0 0 1 0 0 0 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 x",
-        "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1 5", "nan 0 0 0 0 1 0 0 0 0 1 0"};
+    static const char *const wrong[] = {"",
+                                        "1 2 3",
+                                        "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2",
+                                        "1 0 0 0 0 1 0 0 0 0 0 0",
+                                        "1 0 0 0 0 1 0 0 0 0 1 x",
+                                        "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1 5",
+                                        "nan 0 0 0 0 1 0 0 0 0 1 0"};
     mospt_err err;
     double m[16];
     bool found;
@@ -72,8 +77,9 @@ static void a_list_names_files_and_scans(void **state)
     double m[16];
     bool found;
     char *path = core_path(folder, "poses.txt");
-    write_text("poses.txt", "# name, matrix\n\nb 1 0 0 1 0 1 0 0 0 0 1 0\r\n"
-                            "c.las, 1,0,0,2, 0,1,0,0, 0,0,1,0\n\"scan name\" 1 0 0 3 0 1 0 0 0 0 1 0 0 0 0 1");
+    write_text("poses.txt",
+               "# name, matrix\n\nb 1 0 0 1 0 1 0 0 0 0 1 0\r\n"
+               "c.las, 1,0,0,2, 0,1,0,0, 0,0,1,0\n\"scan name\" 1 0 0 3 0 1 0 0 0 0 1 0 0 0 0 1");
     CORE_NEED(prep_pose_list_read(path, &list, &err));
     assert_int_equal(list.count, 3);
     CORE_NEED(find(&list, "b.las", &found, m, &err));
@@ -120,7 +126,8 @@ static int remove_folder(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_sidecar_is_found_by_both_names, make_folder, remove_folder),
+        cmocka_unit_test_setup_teardown(a_sidecar_is_found_by_both_names, make_folder,
+                                        remove_folder),
         cmocka_unit_test_setup_teardown(what_is_no_matrix_is_refused, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(a_list_names_files_and_scans, make_folder, remove_folder),
         cmocka_unit_test(products_apply_the_right_one_first),

@@ -70,8 +70,7 @@ static bool is_ours(const manifest *m)
                has_ending(file, ".las") || has_ending(file, ".laz");
     return starts_with(file, "mutated/") &&
            (has_ending(file, ".las") || has_ending(file, ".ply") || has_ending(file, ".pts") ||
-            has_ending(file, ".txt") || has_ending(file, ".xyz") ||
-            has_ending(file, ".laz"));
+            has_ending(file, ".txt") || has_ending(file, ".xyz") || has_ending(file, ".laz"));
 }
 
 /* Rows that cannot be compared as they stand, with the reason, and what is expected instead. */

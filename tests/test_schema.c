@@ -5,9 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const double low_of[MOSPT_TYPE_COUNT] = {0, INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0, -0x1p63, -16777216, -0x1p53};
-static const double high_of[MOSPT_TYPE_COUNT] = {UINT8_MAX, INT8_MAX, UINT16_MAX, INT16_MAX, UINT32_MAX, INT32_MAX,
-                                                 0x1p53, 0x1p53, 16777216, 0x1p53};
+static const double low_of[MOSPT_TYPE_COUNT] = {0,         INT8_MIN, 0,       INT16_MIN, 0,
+                                                INT32_MIN, 0,        -0x1p63, -16777216, -0x1p53};
+static const double high_of[MOSPT_TYPE_COUNT] = {UINT8_MAX,  INT8_MAX,  UINT16_MAX, INT16_MAX,
+                                                 UINT32_MAX, INT32_MAX, 0x1p53,     0x1p53,
+                                                 16777216,   0x1p53};
 
 static void names_of_types_come_back(void **state)
 {
@@ -35,8 +37,9 @@ static void the_common_type_holds_the_values_of_both(void **state)
                 uint8_t bytes[8];
                 mospt_type_write(c, values[v], bytes);
                 if (mospt_type_read(c, bytes) != values[v])
-                    fail_msg("%s and %s meet in %s, which does not hold %.17g", mospt_type_name((mospt_type)a),
-                             mospt_type_name((mospt_type)b), mospt_type_name(c), values[v]);
+                    fail_msg("%s and %s meet in %s, which does not hold %.17g",
+                             mospt_type_name((mospt_type)a), mospt_type_name((mospt_type)b),
+                             mospt_type_name(c), values[v]);
             }
         }
     assert_int_equal(mospt_type_common(MOSPT_U8, MOSPT_I8), MOSPT_I16);
@@ -52,11 +55,29 @@ static void values_are_rounded_and_clamped(void **state)
         mospt_type type;
         double in, out;
     } cases[] = {
-        {MOSPT_U8, -1, 0}, {MOSPT_U8, 254.6, 255}, {MOSPT_U8, 1e9, 255}, {MOSPT_U8, NAN, 0}, {MOSPT_U8, 2.4, 2},
-        {MOSPT_I8, -129, -128}, {MOSPT_I8, -1.6, -2}, {MOSPT_I8, 127.4, 127}, {MOSPT_I8, INFINITY, 127}, {MOSPT_I8, NAN, 0},
-        {MOSPT_U16, 65535.7, 65535}, {MOSPT_I16, -40000, -32768}, {MOSPT_U32, 5e9, UINT32_MAX}, {MOSPT_U32, -INFINITY, 0},
-        {MOSPT_I32, -3e9, INT32_MIN}, {MOSPT_I32, 3e9, INT32_MAX}, {MOSPT_U64, 1e30, 0x1p64}, {MOSPT_U64, -5, 0},
-        {MOSPT_U64, NAN, 0}, {MOSPT_I64, 1e30, 0x1p63}, {MOSPT_I64, -1e30, -0x1p63}, {MOSPT_I64, NAN, 0}, {MOSPT_F32, 0.5, 0.5},
+        {MOSPT_U8, -1, 0},
+        {MOSPT_U8, 254.6, 255},
+        {MOSPT_U8, 1e9, 255},
+        {MOSPT_U8, NAN, 0},
+        {MOSPT_U8, 2.4, 2},
+        {MOSPT_I8, -129, -128},
+        {MOSPT_I8, -1.6, -2},
+        {MOSPT_I8, 127.4, 127},
+        {MOSPT_I8, INFINITY, 127},
+        {MOSPT_I8, NAN, 0},
+        {MOSPT_U16, 65535.7, 65535},
+        {MOSPT_I16, -40000, -32768},
+        {MOSPT_U32, 5e9, UINT32_MAX},
+        {MOSPT_U32, -INFINITY, 0},
+        {MOSPT_I32, -3e9, INT32_MIN},
+        {MOSPT_I32, 3e9, INT32_MAX},
+        {MOSPT_U64, 1e30, 0x1p64},
+        {MOSPT_U64, -5, 0},
+        {MOSPT_U64, NAN, 0},
+        {MOSPT_I64, 1e30, 0x1p63},
+        {MOSPT_I64, -1e30, -0x1p63},
+        {MOSPT_I64, NAN, 0},
+        {MOSPT_F32, 0.5, 0.5},
         {MOSPT_F64, -1.5e300, -1.5e300},
     };
     (void)state;
@@ -65,7 +86,8 @@ static void values_are_rounded_and_clamped(void **state)
         memset(bytes, 0xa5, sizeof bytes);
         mospt_type_write(cases[k].type, cases[k].in, bytes);
         assert_true(mospt_type_read(cases[k].type, bytes) == cases[k].out);
-        for (size_t i = mospt_type_size(cases[k].type); i < sizeof bytes; i++) assert_int_equal(bytes[i], 0xa5);
+        for (size_t i = mospt_type_size(cases[k].type); i < sizeof bytes; i++)
+            assert_int_equal(bytes[i], 0xa5);
     }
 }
 

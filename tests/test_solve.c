@@ -35,17 +35,21 @@ static void assert_like_twin(const core_site *site, uint32_t depth, uint32_t thr
         assert_int_equal(node->level, want->level);
         assert_int_equal(node->child_mask, want->child_mask);
         assert_int_equal(node->count, want->count);
-        assert_memory_equal(node->level_end, want->level_end, (depth + 2) * sizeof want->level_end[0]);
+        assert_memory_equal(node->level_end, want->level_end,
+                            (depth + 2) * sizeof want->level_end[0]);
         assert_int_equal(node->payload_offset, at);
         assert_int_equal(node->payload_size, node->count * site->stride);
         const uint8_t *payload = made.payload + node->payload_offset;
         for (uint32_t i = 0; i < node->count; i++) {
             uint8_t record[64];
             unpack(payload, node->count, i, record);
-            if (memcmp(record, want->points[i], site->stride) != 0) fail_msg("node %u, point %u", n, i);
+            if (memcmp(record, want->points[i], site->stride) != 0)
+                fail_msg("node %u, point %u", n, i);
         }
         assert_true(node->vertices_hash == mospt_hash(payload, node->count * sizeof(mospt_vertex)));
-        assert_true(node->attributes_hash == mospt_hash(payload + node->count * sizeof(mospt_vertex), node->count * (size_t)6));
+        assert_true(
+            node->attributes_hash ==
+            mospt_hash(payload + node->count * sizeof(mospt_vertex), node->count * (size_t)6));
         at += node->payload_size;
     }
     ref_tree_fini(&tree);
@@ -94,7 +98,8 @@ static void threshold_decides_between_adding_and_rejecting(void **state)
 static void a_single_point_is_one_node(void **state)
 {
     (void)state;
-    for (uint32_t bits = 0; bits <= 32; bits++) check(CORE_UNIFORM, bits, 1, 7, PREP_ADD_THRESHOLD);
+    for (uint32_t bits = 0; bits <= 32; bits++)
+        check(CORE_UNIFORM, bits, 1, 7, PREP_ADD_THRESHOLD);
 }
 
 static void deep_trees_need_more_levels_than_one_code_holds(void **state)
@@ -117,7 +122,8 @@ static void piles_are_cut_into_nodes_of_at_most_pile_max(void **state)
 {
     static const uint32_t more[] = {100, 101}; /* one point is in the node above */
     (void)state;
-    for (size_t k = 0; k < sizeof more / sizeof more[0]; k++) check(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 3, 100);
+    for (size_t k = 0; k < sizeof more / sizeof more[0]; k++)
+        check(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 3, 100);
     check(CORE_IDENTICAL, 0, PREP_PILE_MAX + 5000, 7, PREP_ADD_THRESHOLD);
 }
 

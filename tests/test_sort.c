@@ -17,10 +17,12 @@ static int by_code_then_place(const void *a, const void *b)
 static void check(uint32_t count, uint64_t mask, uint64_t seed)
 {
     uint64_t random = seed;
-    mospt_linear_key *keys = calloc(count + 1, sizeof *keys), *want = calloc(count + 1, sizeof *want),
+    mospt_linear_key *keys = calloc(count + 1, sizeof *keys),
+                     *want = calloc(count + 1, sizeof *want),
                      *spare = malloc((count + 1) * sizeof *spare);
     assert_true(keys != NULL && want != NULL && spare != NULL);
-    for (uint32_t i = 0; i < count; i++) keys[i] = (mospt_linear_key){.code = core_random(&random) & mask, .index = i};
+    for (uint32_t i = 0; i < count; i++)
+        keys[i] = (mospt_linear_key){.code = core_random(&random) & mask, .index = i};
     keys[count] = (mospt_linear_key){.code = 12345, .index = 54321}; /* nobody's */
     memcpy(want, keys, (count + 1) * sizeof *keys);
     qsort(want, count, sizeof *want, by_code_then_place);
@@ -36,14 +38,17 @@ static void few_and_many_keys_are_sorted(void **state)
 {
     static const uint32_t counts[] = {0, 1, 2, 3, 63, 64, 65, 2047, 2048, 2049, 100000};
     (void)state;
-    for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) check(counts[k], UINT64_MAX, k);
+    for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++)
+        check(counts[k], UINT64_MAX, k);
 }
 
 static void every_bit_of_a_code_counts(void **state)
 {
     (void)state;
-    for (int bit = 0; bit < 64; bit++) check(300, UINT64_C(1) << bit, (uint64_t)bit);
-    for (int bit = 1; bit < 64; bit += 7) check(5000, UINT64_MAX << bit, (uint64_t)bit), check(40, UINT64_MAX << bit, 1);
+    for (int bit = 0; bit < 64; bit++)
+        check(300, UINT64_C(1) << bit, (uint64_t)bit);
+    for (int bit = 1; bit < 64; bit += 7)
+        check(5000, UINT64_MAX << bit, (uint64_t)bit), check(40, UINT64_MAX << bit, 1);
 }
 
 static void equal_keys_keep_their_order(void **state)

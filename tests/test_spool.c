@@ -33,7 +33,8 @@ static prep_store *make_store(size_t blocks_in_memory)
 {
     prep_store *store = NULL;
     mospt_err err = {0};
-    CORE_NEED(prep_store_create(folder, RECORD, 1, blocks_in_memory * BLOCK * RECORD, &store, &err));
+    CORE_NEED(
+        prep_store_create(folder, RECORD, 1, blocks_in_memory * BLOCK * RECORD, &store, &err));
     assert_int_equal(prep_store_block_capacity(store), BLOCK);
     return store;
 }
@@ -41,10 +42,12 @@ static prep_store *make_store(size_t blocks_in_memory)
 static void make_record(uint32_t spool, uint32_t i, uint8_t record[RECORD])
 {
     uint64_t random = (uint64_t)spool << 32 | i;
-    for (int k = 0; k < RECORD; k++) record[k] = (uint8_t)core_random(&random);
+    for (int k = 0; k < RECORD; k++)
+        record[k] = (uint8_t)core_random(&random);
 }
 
-static bool fill(prep_store *store, prep_spool *spool, uint32_t name, uint32_t count, mospt_err *err)
+static bool fill(prep_store *store, prep_spool *spool, uint32_t name, uint32_t count,
+                 mospt_err *err)
 {
     uint8_t record[RECORD];
     for (uint32_t i = 0; i < count; i++) {
@@ -115,8 +118,10 @@ static void spools_filled_in_turn_do_not_mix(void **state)
         make_record(s, counts[s]++, record);
         CORE_NEED(prep_spool_append(store, &spools[s], record, &err));
     }
-    for (uint32_t s = 0; s < SPOOLS; s++) CORE_NEED(prep_spool_seal(store, &spools[s], &err));
-    for (uint32_t s = SPOOLS; s-- > 0;) take_and_compare(store, &spools[s], s, counts[s]);
+    for (uint32_t s = 0; s < SPOOLS; s++)
+        CORE_NEED(prep_spool_seal(store, &spools[s], &err));
+    for (uint32_t s = SPOOLS; s-- > 0;)
+        take_and_compare(store, &spools[s], s, counts[s]);
     prep_store_destroy(store);
 }
 
@@ -246,7 +251,8 @@ typedef struct {
 static void fill_one(void *context, uint32_t i)
 {
     crowd *c = context;
-    if (fill(c->store, &c->spools[i], i, 2000, &c->err[i])) prep_spool_seal(c->store, &c->spools[i], &c->err[i]);
+    if (fill(c->store, &c->spools[i], i, 2000, &c->err[i]))
+        prep_spool_seal(c->store, &c->spools[i], &c->err[i]);
 }
 
 static void take_one(void *context, uint32_t i)
@@ -271,7 +277,8 @@ static void many_threads_share_a_store(void **state)
     for (int round = 0; round < 5; round++) {
         prep_workers_run(workers, 16, fill_one, &c);
         prep_workers_run(workers, 16, take_one, &c);
-        for (int i = 0; i < 16; i++) assert_int_equal(c.err[i].code, MOSPT_OK);
+        for (int i = 0; i < 16; i++)
+            assert_int_equal(c.err[i].code, MOSPT_OK);
     }
     prep_workers_destroy(workers);
     prep_store_destroy(c.store);

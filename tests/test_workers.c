@@ -39,7 +39,8 @@ static void every_job_runs_once(void **state)
             w = (work){0};
             prep_workers_run(workers, jobs[j], count_job, &w);
             assert_int_equal(atomic_load(&w.total), jobs[j]);
-            for (uint32_t i = 0; i < JOBS_MAX; i++) assert_int_equal(w.ran[i], i < jobs[j]);
+            for (uint32_t i = 0; i < JOBS_MAX; i++)
+                assert_int_equal(w.ran[i], i < jobs[j]);
         }
         prep_workers_destroy(workers);
     }
@@ -55,7 +56,8 @@ static void runs_follow_each_other_without_mixing(void **state)
     w = (work){0};
     for (uint32_t run = 1; run <= 3000; run++) {
         prep_workers_run(workers, 5, count_job, &w);
-        for (uint32_t i = 0; i < 5; i++) assert_int_equal(w.ran[i], run); /* what jobs wrote is seen after the run */
+        for (uint32_t i = 0; i < 5; i++)
+            assert_int_equal(w.ran[i], run); /* what jobs wrote is seen after the run */
     }
     prep_workers_destroy(workers);
 }
@@ -67,7 +69,8 @@ static void meet(void *context, uint32_t i)
     pthread_mutex_lock(&w->lock);
     w->waiting++;
     pthread_cond_broadcast(&w->met);
-    while (w->waiting < w->wanted) pthread_cond_wait(&w->met, &w->lock);
+    while (w->waiting < w->wanted)
+        pthread_cond_wait(&w->met, &w->lock);
     pthread_mutex_unlock(&w->lock);
 }
 
