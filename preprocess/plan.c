@@ -4,8 +4,8 @@
 
 #include <unistd.h>
 
-/* The program, its libraries, stacks, and what the allocator keeps: measured at 12 MiB, with room
- * for the readers. */
+/* The program, its libraries and stacks (6 MiB where a file has one point), the buffers of the
+ * readers, and what the allocator keeps. */
 static const uint64_t FIXED_SIZE = UINT64_C(24) << 20;
 enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 1 << 20, BATCH_MIN = 8192, BATCH_MAX = 65536, BATCHES = 4 };
 
