@@ -104,6 +104,14 @@ static bool compare(const std::vector<double> &ours, const std::vector<double> a
     return true;
 }
 
+/* Files that PCL reads otherwise, and why we do not follow it. */
+static const char *known_difference(const std::string &file)
+{
+    if (file.find("rangemaps__lato000") != std::string::npos)
+        return "PCL takes the camera's viewport for the size of the cloud, and reads behind its end";
+    return nullptr;
+}
+
 enum verdict { SAME = 0, DIFFERENT = 1, SKIPPED = 2 };
 
 static verdict judge(const std::string &file, bool is_ours, const std::vector<double> &ours,
@@ -112,6 +120,10 @@ static verdict judge(const std::string &file, bool is_ours, const std::vector<do
     std::vector<double> axes[3];
     const std::string name = std::filesystem::path(file).filename().string();
     const std::string our_reason = reason;
+    if (is_ours && known_difference(file) != nullptr) {
+        std::printf("skip %s: %s\n", name.c_str(), known_difference(file));
+        return SKIPPED;
+    }
     if (!read_pcl(file, axes, reason) || (!is_ours && axes[0].empty())) {
         std::printf("skip %s: %s\n", name.c_str(), reason.c_str());
         return SKIPPED;
@@ -122,6 +134,13 @@ static verdict judge(const std::string &file, bool is_ours, const std::vector<do
     }
     std::printf("DIFFERENT %s: %s\n", name.c_str(), is_ours ? reason.c_str() : our_reason.c_str());
     return DIFFERENT;
+}
+
+/* Under the address sanitizer too, a crash of PCL shall be a signal that ends its process. */
+extern "C" const char *__asan_default_options(void);
+extern "C" const char *__asan_default_options(void)
+{
+    return "handle_segv=0:handle_abort=0:handle_sigbus=0";
 }
 
 /* PCL crashes on some valid files, so it gets a process of its own; ours is read before, where a
