@@ -1,6 +1,7 @@
 #include "preprocess/e57.h"
 
 #include "preprocess/bytes.h"
+#include "preprocess/e57_index.h"
 #include "preprocess/e57_planes.h"
 
 #include <inttypes.h>
@@ -10,173 +11,18 @@
 #include <string.h>
 
 enum {
-    HEADER_SIZE = 48,
     SAMPLE_PROBES = 64,
     SAMPLE_WALK_MAX = 1024 /* packets, at most 64 MiB of a scan */
 };
 
-/* Records without a single bit need no file to hold them; no scanner writes more than one. */
-enum { EMPTY_RECORDS_MAX = 1 << 20 };
-
 typedef struct {
-    uint32_t major, minor;
-    uint64_t file_size, xml_offset, xml_size, page_size;
-} header;
-
-typedef struct {
-    header header;
+    prep_e57_found found;
     prep_e57_pages pages;
-    prep_e57_scan *desc; /* owned, the scan that was asked for */
     prep_e57_vector vector;
     prep_e57_points points;
     uint64_t next; /* record */
     bool is_ended; /* before the last record */
 } e57_state;
-
-static bool refuse(const prep_scan *scan, uint64_t place, const char *why, mospt_err *err)
-{
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, place), "%s", why);
-}
-
-static bool read_header(prep_scan *scan, e57_state *e57, mospt_err *err)
-{
-    uint8_t bytes[HEADER_SIZE];
-    size_t got;
-    header *h = &e57->header;
-    if (prep_input_is_gzip(scan->input))
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(scan->path),
-                             "an E57 file inside gzip: unpack it first");
-    prep_e57_pages_init(&e57->pages, scan->input);
-    if (!prep_e57_pages_read(&e57->pages, 0, bytes, sizeof bytes, &got, err)) return false;
-    if (got < sizeof bytes) {
-        uint64_t place;
-        const char *why = prep_e57_pages_fault(&e57->pages, 0, &place);
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, place),
-                             "%s, in the file's header", why);
-    }
-    if (memcmp(bytes, "ASTM-E57", 8) != 0)
-        return refuse(scan, 0, "the file does not begin with ASTM-E57", err);
-    h->major = prep_le32(bytes + 8);
-    h->minor = prep_le32(bytes + 12);
-    h->file_size = prep_le64(bytes + 16);
-    h->xml_offset = prep_le64(bytes + 24);
-    h->xml_size = prep_le64(bytes + 32);
-    h->page_size = prep_le64(bytes + 40);
-    if (h->major == 1 && h->page_size == PREP_E57_PAGE_SIZE) return true;
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, 8),
-                         "version %" PRIu32 ".%" PRIu32 " with pages of %" PRIu64
-                         " bytes; known is 1.0 with 1024",
-                         h->major, h->minor, h->page_size);
-}
-
-/* Finds the XML section. That a file was cut is told even if the section is still there. */
-static bool locate_xml(prep_scan *scan, e57_state *e57, prep_e57_xml *xml, mospt_err *err)
-{
-    const header *h = &e57->header;
-    uint64_t size = prep_input_size(scan->input), end = e57->pages.page_count * PREP_E57_PAGE_DATA;
-    bool is_there = prep_e57_pages_locate(&e57->pages, h->xml_offset, &xml->offset) &&
-                    h->xml_size > 0 && h->xml_size <= end - xml->offset;
-    xml->size = h->xml_size;
-    if (!is_there && size < h->file_size)
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, size),
-                             "the file is cut: %" PRIu64 " of %" PRIu64
-                             " bytes are there, and without the description of "
-                             "the scans (XML), which is missing, no point can be read",
-                             size, h->file_size);
-    if (!is_there)
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, 24),
-                             "the description of the scans (XML), %" PRIu64 " bytes at %" PRIu64
-                             ", does not lie in the file",
-                             h->xml_size, h->xml_offset);
-    if (size < h->file_size)
-        prep_scan_set_damage(scan, mospt_at_byte(scan->path, size),
-                             "the file is cut: %" PRIu64 " of %" PRIu64 " bytes are there", size,
-                             h->file_size);
-    return true;
-}
-
-/* Goes through the scans of a file to find the one that is wanted. */
-typedef struct {
-    e57_state *e57;
-    const char *path;
-    uint32_t wanted;
-    uint32_t seen, usable, broken;
-    mospt_err fault; /* of the first broken one */
-} search;
-
-/* Why the points of a scan cannot be read; MOSPT_OK in err->code if they can. */
-static void judge(const search *s, const prep_e57_scan *desc, mospt_err *err)
-{
-    char why[256];
-    if (!prep_e57_points_are_possible(desc, why, sizeof why)) {
-        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(s->path), "%s", why);
-        return;
-    }
-    prep_e57_vector vector;
-    if (!prep_e57_vector_open(&s->e57->pages, desc->offset, desc->field_count, &vector, err))
-        return;
-    prep_e57_points *points = &s->e57->points; /* free for use until the wanted scan is found */
-    prep_e57_points_init(points, desc);
-    if (prep_e57_points_bits(points) == 0 && desc->record_count > EMPTY_RECORDS_MAX)
-        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(s->path),
-                      "it claims %" PRIu64 " records of 0 bits", desc->record_count);
-}
-
-static bool on_scan(void *context, const prep_e57_scan *desc, mospt_err *err)
-{
-    search *s = context;
-    mospt_err fault = {0};
-    s->seen++;
-    if (!desc->has_points || (desc->record_count == 0 && desc->fault[0] == '\0')) return true;
-    judge(s, desc, &fault);
-    if (fault.code == MOSPT_OK) {
-        if (s->usable++ == s->wanted) *s->e57->desc = *desc;
-    } else if (fault.code != MOSPT_EFORMAT) {
-        *err = fault;
-        return false;
-    } else if (s->broken++ == 0) {
-        mospt_where where = {.file = s->path, .kind = fault.place_kind, .place = fault.place};
-        mospt_err_set(&s->fault, MOSPT_EFORMAT, where,
-                      "scan %" PRIu32 " (%.64s) cannot be read: %.256s", s->seen,
-                      desc->name[0] != '\0' ? desc->name : "without a name", fault.message);
-    }
-    return true;
-}
-
-static void note(prep_scan *scan, const mospt_err *err)
-{
-    mospt_where where = {.file = scan->path, .kind = err->place_kind, .place = err->place};
-    prep_scan_set_damage(scan, where, "%s", err->message);
-}
-
-static bool search_scans(prep_scan *scan, e57_state *e57, search *s, mospt_err *err)
-{
-    prep_e57_xml xml = {.on_scan = on_scan, .context = s};
-    prep_e57_file file = {0};
-    mospt_err why = {0};
-    if (!locate_xml(scan, e57, &xml, err)) return false;
-    bool ok = prep_e57_xml_read(&e57->pages, &xml, &file, &why);
-    if (!ok && file.is_not_utf8 && !file.has_all_scans) {
-        free(file.crs);
-        s->seen = s->usable = s->broken = 0;
-        xml.as_latin1 = true; /* some writers name scans in the code page of their machine */
-        ok = prep_e57_xml_read(&e57->pages, &xml, &file, &why);
-    }
-    if (file.crs != NULL) snprintf(scan->info.crs, sizeof scan->info.crs, "%s", file.crs);
-    free(file.crs);
-    if (!ok && (why.code != MOSPT_EFORMAT || !file.has_all_scans)) {
-        if (err != NULL) *err = why;
-        return false;
-    }
-    if (!ok) note(scan, &why); /* behind the scans there are only pictures */
-    if (s->usable > 0) return true;
-    if (s->broken > 0 && err != NULL) *err = s->fault;
-    if (s->broken > 0) return false;
-    return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
-                         "the E57 file holds %" PRIu32 " scans and %" PRIu32
-                         " images, but no points",
-                         s->seen, file.image_count);
-}
 
 typedef struct {
     double *intensity; /* [PREP_TONE_SAMPLES], owned */
@@ -256,13 +102,13 @@ static bool sample_scan(e57_state *e57, sample *s, uint64_t *before, mospt_err *
         streams[i] = &p->channel[i].stream;
     uint64_t packets = guess_packets(e57);
     if (packets > SAMPLE_WALK_MAX) packets = SAMPLE_WALK_MAX;
-    if (e57->desc->record_count <= PREP_TONE_SAMPLES) packets = 1; /* all of them */
+    if (e57->found.desc->record_count <= PREP_TONE_SAMPLES) packets = 1; /* all of them */
     uint64_t probes = packets < SAMPLE_PROBES ? packets : SAMPLE_PROBES;
     prep_e57_walk walk = {.packet = e57->vector.begin, .before = before};
     prep_e57_points_start(p, &e57->vector);
     bool can_jump = true;
     for (uint64_t i = 0; i < probes; i++) {
-        uint64_t left = e57->desc->record_count - s->record_count;
+        uint64_t left = e57->found.desc->record_count - s->record_count;
         uint64_t share = PREP_TONE_SAMPLES / probes;
         if (!sample_here(e57, s, share < left ? share : left, err)) return false;
         e57->pages.ahead = 4;
@@ -283,7 +129,7 @@ static bool is_inside(const sample *s, const double low[3], const double high[3]
 /* The box of the scan in its own frame, as its description gives it. */
 static bool declared_box(const e57_state *e57, double low[3], double high[3])
 {
-    const prep_e57_scan *d = e57->desc;
+    const prep_e57_scan *d = e57->found.desc;
     bool ok = true;
     for (int a = 0; a < 3; a++) {
         low[a] = d->low[a];
@@ -336,13 +182,16 @@ static bool take_sample(prep_scan *scan, e57_state *e57, mospt_err *err)
     ok = ok && sample_scan(e57, &s, before, err);
     if (ok && s.record_count == 0) {
         const prep_e57_vector *v = &e57->vector;
-        ok = refuse(scan, v->fault != NULL ? v->fault_place : prep_e57_physical(v->begin),
-                    v->fault != NULL ? v->fault : "the section of points holds none", err);
+        ok =
+            mospt_err_set(err, MOSPT_EFORMAT,
+                          mospt_at_byte(scan->path, v->fault != NULL ? v->fault_place
+                                                                     : prep_e57_physical(v->begin)),
+                          "%s", v->fault != NULL ? v->fault : "the section of points holds none");
     }
     if (ok) {
         e57->points.tone = prep_tone_make(s.intensity, s.intensity_count);
         scan->info.has_intensity = e57->points.intensity >= 0 && !e57->points.tone.is_flat;
-        prep_e57_planes_add(&e57->points, scan, e57->desc, s.rgb_max, s.return_index_min);
+        prep_e57_planes_add(&e57->points, scan, e57->found.desc, s.rgb_max, s.return_index_min);
         set_bounds(scan, e57, &s);
     }
     free(s.intensity);
@@ -385,10 +234,10 @@ static const char *kind_name(const e57_state *e57)
 static void describe(prep_scan *scan, const e57_state *e57, uint32_t index)
 {
     prep_scan_info *info = &scan->info;
-    const prep_e57_scan *d = e57->desc;
+    const prep_e57_scan *d = e57->found.desc;
     const prep_e57_points *p = &e57->points;
     snprintf(info->format, sizeof info->format, "E57 %" PRIu32 ".%" PRIu32 ", %s, %s",
-             e57->header.major, e57->header.minor, p->is_spherical ? "spherical" : "Cartesian",
+             e57->found.major, e57->found.minor, p->is_spherical ? "spherical" : "Cartesian",
              kind_name(e57));
     if (d->name[0] != '\0' || d->guid[0] != '\0')
         snprintf(info->name, sizeof info->name, "%s", d->name[0] != '\0' ? d->name : d->guid);
@@ -423,19 +272,18 @@ static bool e57_rewind(prep_scan *scan, mospt_err *err)
 static bool e57_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,
                      mospt_err *err)
 {
-    (void)options;
+    if (prep_input_is_gzip(scan->input))
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(scan->path),
+                             "an E57 file inside gzip: unpack it first");
     e57_state *e57 = calloc(1, sizeof *e57);
     if (e57 == NULL) return mospt_err_nomem(err, sizeof *e57);
     scan->state = e57;
-    e57->desc = calloc(1, sizeof *e57->desc);
-    if (e57->desc == NULL) return mospt_err_nomem(err, sizeof *e57->desc);
-    search s = {.e57 = e57, .path = scan->path, .wanted = index};
-    if (!read_header(scan, e57, err) || !search_scans(scan, e57, &s, err)) return false;
-    scan->info.scan_count = s.usable;
-    if (index >= s.usable) return true; /* the caller has something to say about that */
-    if (s.broken > 0 && index == 0) note(scan, &s.fault);
+    prep_e57_pages_init(&e57->pages, scan->input);
+    if (!prep_e57_find(scan, &e57->pages, options->memory, index, &e57->found, err)) return false;
+    scan->info.scan_count = e57->found.scan_count;
+    const prep_e57_scan *d = e57->found.desc;
+    if (d == NULL) return true; /* the caller has something to say about that */
 
-    const prep_e57_scan *d = e57->desc;
     prep_e57_points_init(&e57->points, d);
     if (!prep_e57_vector_open(&e57->pages, d->offset, d->field_count, &e57->vector, err))
         return false;
@@ -453,15 +301,15 @@ static void note_end(prep_scan *scan, const e57_state *e57)
         mospt_at_byte(scan->path, v->fault != NULL ? v->fault_place : prep_e57_physical(v->end)),
         "%s; %" PRIu64 " of %" PRIu64 " records were read",
         v->fault != NULL ? v->fault : "the scan's points end here", e57->next,
-        e57->desc->record_count);
+        e57->found.desc->record_count);
 }
 
 static bool e57_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     e57_state *e57 = scan->state;
-    while (batch->count < batch->capacity && e57->next < e57->desc->record_count &&
+    while (batch->count < batch->capacity && e57->next < e57->found.desc->record_count &&
            !e57->is_ended) {
-        uint64_t left = e57->desc->record_count - e57->next;
+        uint64_t left = e57->found.desc->record_count - e57->next;
         uint32_t want = batch->capacity - batch->count, got;
         if (want > PREP_E57_BLOCK) want = PREP_E57_BLOCK;
         if (want > left) want = (uint32_t)left;
@@ -482,7 +330,7 @@ static void e57_close(prep_scan *scan)
     e57_state *e57 = scan->state;
     if (e57 == NULL) return;
     release(e57);
-    free(e57->desc);
+    free(e57->found.desc);
     free(e57);
 }
 

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -13,6 +12,7 @@ enum { PACKED_SIZE = 64 * 1024 };
 struct prep_input {
     char *path; /* owned */
     int fd;
+    struct stat status;
     uint64_t size;
     uint64_t position;     /* of the next unpacked byte */
     uint64_t raw_position; /* of the next byte to take from the file */
@@ -45,14 +45,13 @@ static bool open_file(prep_input *in, mospt_err *err)
     /* without O_NONBLOCK, opening a pipe that nobody writes to would wait forever */
     in->fd = open(in->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (in->fd < 0) return mospt_err_set(err, MOSPT_EIO, mospt_at_file(in->path), "cannot open");
-    struct stat st;
-    if (fstat(in->fd, &st) != 0)
+    if (fstat(in->fd, &in->status) != 0)
         return mospt_err_set(err, MOSPT_EIO, mospt_at_file(in->path), "cannot examine");
-    if (!S_ISREG(st.st_mode))
+    if (!S_ISREG(in->status.st_mode))
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(in->path),
-                             S_ISDIR(st.st_mode) ? "a folder, not a scan file"
-                                                 : "not a regular file");
-    in->size = (uint64_t)st.st_size;
+                             S_ISDIR(in->status.st_mode) ? "a folder, not a scan file"
+                                                         : "not a regular file");
+    in->size = (uint64_t)in->status.st_size;
     return true;
 }
 
@@ -104,6 +103,10 @@ uint64_t prep_input_size(const prep_input *input)
 bool prep_input_is_gzip(const prep_input *input)
 {
     return input->is_gzip;
+}
+const struct stat *prep_input_status(const prep_input *input)
+{
+    return &input->status;
 }
 uint64_t prep_input_tell(const prep_input *input)
 {

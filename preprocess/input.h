@@ -6,6 +6,8 @@
 #pragma once
 #include "mospt/err.h"
 
+#include <sys/stat.h>
+
 typedef struct prep_input prep_input; /* opaque; one thread at a time */
 
 /* Opens a regular file. Anything else (a folder, a pipe) is refused rather than waited for.
@@ -16,6 +18,7 @@ void prep_input_close(prep_input *input);
 const char *prep_input_path(const prep_input *input); /* as given to open; borrowed */
 uint64_t prep_input_size(const prep_input *input);    /* bytes of the file itself, packed or not */
 bool prep_input_is_gzip(const prep_input *input);
+const struct stat *prep_input_status(const prep_input *input); /* as it was opened; borrowed */
 
 /* Reads the next bytes, unpacked.
  * got      out, bytes read; fewer than `size` at the end of the data, or where a gzip stream is

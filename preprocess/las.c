@@ -5,12 +5,14 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-/* A block stays in the second-level cache while each attribute is picked from it in turn. */
 enum {
-    BLOCK_SIZE = 256 * 1024,
-    SAMPLE_BLOCKS = 64,
-    SAMPLE_RECORDS = 1024,
-    LOOK_SIZE = 1024 * 1024
+    BLOCK_SIZE = 256 * 1024, /* stays in the second-level cache while each attribute is picked from
+                                it in turn */
+    SAMPLE_PLACES = 64,
+    SAMPLE_STRIDE = 50000, /* points of a chunk as most LAZ files have them: the first records of a
+                              chunk are cheap to have */
+    SAMPLE_SKIPPED_MAX = 400000, /* records, a tenth of a second */
+    LOOK_SIZE = 1024 * 1024,
 };
 
 typedef struct {
@@ -45,45 +47,67 @@ static uint64_t record_offset(const las_state *las, uint64_t point)
     return las->header.data_offset + point * las->header.record_length;
 }
 
-/* Looks at blocks of records spread evenly over the file: the first points of a scan are often all
- * alike. */
-static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample, mospt_err *err)
+/* Where the sample is taken: places spread evenly over the file, since the first points of a scan
+ * are often all alike. */
+typedef struct {
+    uint64_t parts; /* that the file is divided into */
+    uint32_t looks; /* at that many of them, from their first record on */
+    bool by_chunks; /* parts are those of the LAZ file */
+} sample_places;
+
+static sample_places make_places(uint64_t parts, bool by_chunks)
 {
-    if (!alloc_block(las, err)) return false;
-    uint64_t count = las->header.present, length = las->header.record_length;
-    uint64_t want = las->block_records < SAMPLE_RECORDS ? las->block_records : SAMPLE_RECORDS;
-    uint64_t blocks = count / want < SAMPLE_BLOCKS ? (count + want - 1) / want : SAMPLE_BLOCKS;
-    for (uint64_t b = 0; b < blocks; b++) {
-        uint64_t first = blocks == SAMPLE_BLOCKS ? count / blocks * b : want * b;
-        uint64_t n = count - first < want ? count - first : want;
-        size_t got;
-        if (!prep_input_read_at(scan->input, record_offset(las, first), las->block, n * length,
-                                &got, err))
-            return false;
-        prep_las_sample_add(sample, &las->header, las->block, got / length);
-    }
-    free(las->block);
-    las->block = NULL;
-    return true;
+    return (sample_places){parts, parts < SAMPLE_PLACES ? (uint32_t)parts : (uint32_t)SAMPLE_PLACES,
+                           by_chunks};
 }
 
-/* The same of a compressed file, where the first records of a chunk are cheap to have, and others
- * are not. They must be decoded: fewer will do. */
-static bool take_sample_of_chunks(las_state *las, prep_las_sample *sample, mospt_err *err)
+static uint64_t first_record(const las_state *las, const sample_places *places, uint32_t look)
+{
+    uint64_t part = places->parts * look / places->looks;
+    return places->by_chunks ? prep_laz_chunk_first(las->laz, (uint32_t)part)
+                             : part * SAMPLE_STRIDE;
+}
+
+/* The same for LAS and for LAZ, so that both show the same; but for chunks that begin elsewhere,
+ * and that it would take too long to decode as far as these places. */
+static sample_places choose_places(const las_state *las)
+{
+    sample_places places =
+        make_places((las->header.present + SAMPLE_STRIDE - 1) / SAMPLE_STRIDE, false);
+    uint64_t skipped = 0;
+    for (uint32_t i = 0; las->laz != NULL && i < places.looks; i++) {
+        uint64_t lead = prep_laz_lead(las->laz, first_record(las, &places, i));
+        skipped = lead <= SAMPLE_SKIPPED_MAX ? skipped + lead : UINT64_MAX;
+        if (skipped > SAMPLE_SKIPPED_MAX) return make_places(prep_laz_chunk_count(las->laz), true);
+    }
+    return places;
+}
+
+static bool look(prep_scan *scan, las_state *las, uint64_t first, uint8_t *records, size_t count,
+                 size_t *got, mospt_err *err)
 {
     size_t length = las->header.record_length;
-    uint32_t count = prep_laz_chunk_count(las->laz);
-    uint32_t looks = count < SAMPLE_BLOCKS ? count : SAMPLE_BLOCKS;
-    size_t want = looks > 0 ? PREP_TONE_SAMPLES / looks : 0;
-    if (want > LOOK_SIZE / length) want = LOOK_SIZE / length;
-    uint8_t *records = malloc(want * length + 1);
-    if (records == NULL) return mospt_err_nomem(err, want * length);
+    if (las->laz != NULL) return prep_laz_look(las->laz, first, records, count, got, err);
+    bool ok = prep_input_read_at(scan->input, record_offset(las, first), records, count * length,
+                                 got, err);
+    *got /= length;
+    return ok;
+}
+
+static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample, mospt_err *err)
+{
+    const prep_las_header *h = &las->header;
+    sample_places places = choose_places(las);
+    size_t want = places.looks > 0 ? PREP_TONE_SAMPLES / places.looks : 0;
+    if (want > LOOK_SIZE / h->record_length) want = LOOK_SIZE / h->record_length;
+    uint8_t *records = malloc(want * h->record_length + 1);
+    if (records == NULL) return mospt_err_nomem(err, want * h->record_length);
     bool ok = true;
-    for (uint32_t i = 0; i < looks && ok; i++) {
+    for (uint32_t i = 0; i < places.looks && ok; i++) {
+        uint64_t first = first_record(las, &places, i), left = h->present - first;
         size_t got;
-        uint32_t chunk = (uint32_t)((uint64_t)count * i / looks);
-        ok = prep_laz_look(las->laz, chunk, records, want, &got, err);
-        if (ok) prep_las_sample_add(sample, &las->header, records, got);
+        ok = look(scan, las, first, records, left < want ? (size_t)left : want, &got, err);
+        if (ok) prep_las_sample_add(sample, h, records, got);
     }
     free(records);
     return ok;
@@ -127,11 +151,8 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
             las->header.declared, las->header.present);
 
     prep_las_sample sample;
-    uint64_t sampled = las->laz != NULL ? PREP_TONE_SAMPLES : SAMPLE_BLOCKS * SAMPLE_RECORDS;
-    if (las->header.present < sampled) sampled = las->header.present;
-    if (!prep_las_sample_init(&sample, sampled, err)) return false;
-    bool ok = las->laz != NULL ? take_sample_of_chunks(las, &sample, err)
-                               : take_sample(scan, las, &sample, err);
+    if (!prep_las_sample_init(&sample, err)) return false;
+    bool ok = take_sample(scan, las, &sample, err);
     if (ok) prep_las_layout_make(scan, &las->header, &sample, &las->layout);
     prep_las_sample_fini(&sample);
     return ok;

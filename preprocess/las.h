@@ -63,13 +63,11 @@ uint32_t prep_las_record_size(uint8_t point_format);
 /* What a sample of the records says about colour and intensity. */
 typedef struct {
     uint16_t rgb_max;
-    double *intensity; /* [PREP_TONE_SAMPLES], owned, of every `step`th record */
+    double *intensity; /* [PREP_TONE_SAMPLES], owned, of the first records */
     size_t count;
-    uint64_t seen, step;
 } prep_las_sample;
 
-/* record_count   how many records will be added */
-bool prep_las_sample_init(prep_las_sample *sample, uint64_t record_count, mospt_err *err);
+bool prep_las_sample_init(prep_las_sample *sample, mospt_err *err);
 void prep_las_sample_fini(prep_las_sample *sample);
 void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header,
                          const uint8_t *records, size_t count);

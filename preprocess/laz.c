@@ -1,20 +1,33 @@
 #include "preprocess/laz.h"
 
+#include "preprocess/ahead.h"
 #include "preprocess/bytes.h"
-#include "preprocess/laz_ahead.h"
 #include "preprocess/laz_table.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 enum {
-    BLOCK_SIZE = 256 * 1024, /* of records, where no other threads decode */
+    PART_SIZE = 256 * 1024,            /* of records, which one thread decodes and delivers */
+    PART_SIZE_AHEAD = 4 * 1024 * 1024, /* where others decode ahead: holds most chunks as a whole */
     VLR_SIZE = 54,
     FORMAT_SIZE_MAX = 256, /* more than any list of items has */
     LASZIP_RECORD = 22204,
 };
+
+/* A chunk that is being decoded, and what has been decoded of it and not yet delivered. */
+typedef struct {
+    prep_laz_chunk *chunk; /* owned */
+    prep_laz_place place;
+    uint32_t number;  /* of the chunk; that of chunks: there is none */
+    uint8_t *records; /* [capacity], owned */
+    size_t capacity, count;
+    uint64_t done; /* records of the chunk so far */
+    bool has_more; /* records than fit */
+    const char *damage;
+    uint64_t damage_byte;
+} block;
 
 struct prep_laz {
     prep_input *input; /* borrowed */
@@ -23,15 +36,12 @@ struct prep_laz {
     uint32_t thread_count;
     mospt_err table_damage, damage; /* MOSPT_OK: none */
 
-    prep_laz_ahead *ahead; /* owned; decodes, if there are chunks enough for several threads */
-    prep_laz_chunk *chunk; /* owned; decodes otherwise */
-    uint8_t *block;        /* [block_records * record_length], owned */
-    size_t block_records;
-    uint32_t place; /* chunk that is being decoded without other threads */
-    bool is_within; /* and has been begun with */
+    prep_ahead *ahead; /* owned; NULL: nothing has been read */
+    size_t part_records;
+    uint32_t next;     /* chunk to begin with; of whoever fills a block */
+    block *block;      /* borrowed from `ahead`; NULL before the first */
+    size_t block_used; /* records of it that have been delivered */
     bool is_at_end;
-    prep_laz_part part;
-    size_t part_used; /* records of it that have been delivered */
 };
 
 static bool read_format(prep_input *in, const prep_las_header *h, prep_laz_format *out,
@@ -56,22 +66,13 @@ static bool read_format(prep_input *in, const prep_las_header *h, prep_laz_forma
                          "the points are compressed, but the record that says how is missing");
 }
 
-static uint32_t choose_threads(uint32_t wanted)
-{
-    if (wanted == 0) {
-        long processors = sysconf(_SC_NPROCESSORS_ONLN);
-        wanted = processors > 0 ? (uint32_t)processors : 1;
-    }
-    return wanted < PREP_LAZ_THREADS_MAX ? wanted : PREP_LAZ_THREADS_MAX;
-}
-
 bool prep_laz_open(prep_input *input, const prep_las_header *header, uint32_t threads,
                    prep_laz **out, mospt_err *err)
 {
     prep_laz *laz = calloc(1, sizeof *laz);
     if (laz == NULL) return mospt_err_nomem(err, sizeof *laz);
     laz->input = input;
-    laz->thread_count = choose_threads(threads);
+    laz->thread_count = threads > 0 ? threads : prep_ahead_thread_count();
     if (!read_format(input, header, &laz->format, err) ||
         !prep_laz_table_read(input, header, &laz->format, &laz->table, &laz->table_damage, err)) {
         prep_laz_close(laz);
@@ -85,14 +86,11 @@ bool prep_laz_open(prep_input *input, const prep_las_header *header, uint32_t th
 /* Lets go of everything that reading takes. */
 static void stop_reading(prep_laz *laz)
 {
-    prep_laz_ahead_destroy(laz->ahead);
-    prep_laz_chunk_destroy(laz->chunk);
-    free(laz->block);
+    prep_ahead_destroy(laz->ahead);
     laz->ahead = NULL;
-    laz->chunk = NULL;
     laz->block = NULL;
-    laz->part = (prep_laz_part){0};
-    laz->part_used = 0;
+    laz->block_used = 0;
+    laz->next = 0;
 }
 
 void prep_laz_close(prep_laz *laz)
@@ -123,63 +121,114 @@ const mospt_err *prep_laz_damage(const prep_laz *laz)
     return laz->damage.code != MOSPT_OK ? &laz->damage : NULL;
 }
 
-static void note_damage(prep_laz *laz, uint32_t place, const char *sentence, uint64_t byte)
+static void note_damage(prep_laz *laz, const block *b)
 {
-    if (sentence == NULL || laz->damage.code != MOSPT_OK) return;
-    mospt_err_set(&laz->damage, MOSPT_EFORMAT, mospt_at_byte(prep_input_path(laz->input), byte),
-                  "chunk %" PRIu32 ": %s", place, sentence);
+    if (b->damage == NULL || laz->damage.code != MOSPT_OK) return;
+    mospt_err_set(&laz->damage, MOSPT_EFORMAT,
+                  mospt_at_byte(prep_input_path(laz->input), b->damage_byte),
+                  "chunk %" PRIu32 ": %s", b->number, b->damage);
 }
 
-static bool prepare(prep_laz *laz, mospt_err *err)
+/* Where no table says it, the next chunk begins where the last one has ended, which there is only
+ * one block to know of.
+ * has_next  out */
+static bool find_next(prep_laz *laz, const block *last, bool *has_next, mospt_err *err)
 {
-    if (laz->ahead != NULL || laz->chunk != NULL) return true;
-    laz->place = 0;
-    laz->is_within = false;
-    if (laz->thread_count > 1 && laz->table.count > 1 && !laz->table.is_open &&
-        !prep_laz_ahead_create(laz->input, &laz->format, &laz->table, laz->thread_count,
-                               &laz->ahead, err))
-        return false;
-    if (laz->ahead != NULL) return true;
-    laz->block_records = (size_t)BLOCK_SIZE / laz->format.record_length;
-    if (laz->block_records == 0) laz->block_records = 1;
-    size_t size = laz->block_records * laz->format.record_length;
-    laz->block = malloc(size);
-    if (laz->block == NULL) return mospt_err_nomem(err, size);
-    return prep_laz_chunk_create(&laz->format, &laz->chunk, err);
-}
-
-/* Notes what a chunk has come to, and where the next one begins if no table said so. */
-static bool end_place(prep_laz *laz, mospt_err *err)
-{
-    uint64_t byte;
-    const char *damage = prep_laz_chunk_damage(laz->chunk, &byte);
-    note_damage(laz, laz->place, damage, byte);
-    laz->is_within = false;
-    laz->place++;
-    if (laz->place < laz->table.count || !laz->table.is_open || damage != NULL) return true;
     mospt_err failed = {0};
-    if (prep_laz_table_go_on(&laz->table, &laz->format, prep_laz_chunk_end(laz->chunk), &failed))
-        return true;
+    *has_next =
+        laz->next < laz->table.count ||
+        (laz->table.is_open && last->chunk != NULL && last->damage == NULL &&
+         prep_laz_table_go_on(&laz->table, &laz->format, prep_laz_chunk_end(last->chunk), &failed));
     if (failed.code == MOSPT_OK) return true;
     if (err != NULL) *err = failed;
     return false;
 }
 
-/* Decodes some records of the chunk whose turn it is. */
-static bool decode_here(prep_laz *laz, mospt_err *err)
+static bool fill(void *context, void *memory, bool *is_last, mospt_err *err)
 {
-    laz->part = (prep_laz_part){.records = laz->block};
-    while (laz->part.count == 0 && laz->place < laz->table.count) {
-        const prep_laz_place *p = &laz->table.places[laz->place];
-        bool ends_early = laz->table.is_open || laz->format.compressor == PREP_LAZ_ROWS;
-        if (!laz->is_within && !prep_laz_chunk_begin(laz->chunk, laz->input, p->offset, p->size,
-                                                     p->points, ends_early, err))
-            return false;
-        laz->is_within = true;
-        if (!prep_laz_chunk_read(laz->chunk, laz->block, laz->block_records, &laz->part.count, err))
-            return false;
-        if (laz->part.count < laz->block_records && !end_place(laz, err)) return false;
+    prep_laz *laz = context;
+    block *b = memory;
+    bool has_next;
+    if (!find_next(laz, b, &has_next, err)) return false;
+    *is_last = !has_next;
+    b->number = laz->next;
+    if (has_next) b->place = laz->table.places[laz->next++];
+    return true;
+}
+
+static bool make_room(block *b, size_t count, size_t record_length, mospt_err *err)
+{
+    if (b->capacity >= count) return true;
+    free(b->records);
+    b->records = malloc(count * record_length);
+    b->capacity = b->records != NULL ? count : 0;
+    return b->records != NULL || mospt_err_nomem(err, count * record_length);
+}
+
+/* Decodes the next records of a chunk. */
+static bool decode(const prep_laz *laz, block *b, mospt_err *err)
+{
+    size_t most = laz->part_records;
+    if (b->place.points < most) most = (size_t)b->place.points;
+    if (!make_room(b, most, laz->format.record_length, err) ||
+        !prep_laz_chunk_read(b->chunk, b->records, most, &b->count, err))
+        return false;
+    b->done += b->count;
+    b->has_more = b->count == most && b->done < b->place.points;
+    if (!b->has_more) b->damage = prep_laz_chunk_damage(b->chunk, &b->damage_byte);
+    return true;
+}
+
+static bool work(const void *context, void *memory, mospt_err *err)
+{
+    const prep_laz *laz = context;
+    block *b = memory;
+    b->count = 0;
+    b->done = 0;
+    b->has_more = false;
+    b->damage = NULL;
+    if (b->number == laz->table.count) return true;
+    bool ends_early = laz->table.is_open || laz->format.compressor == PREP_LAZ_ROWS;
+    return (b->chunk != NULL || prep_laz_chunk_create(&laz->format, &b->chunk, err)) &&
+           prep_laz_chunk_begin(b->chunk, laz->input, b->place.offset, b->place.size,
+                                b->place.points, ends_early, err) &&
+           decode(laz, b, err);
+}
+
+static void fini(void *memory)
+{
+    block *b = memory;
+    prep_laz_chunk_destroy(b->chunk);
+    free(b->records);
+}
+
+static bool start_reading(prep_laz *laz, mospt_err *err)
+{
+    const prep_ahead_task task = {laz, sizeof(block), fill, work, fini};
+    uint32_t threads = laz->table.is_open ? 0 : laz->thread_count;
+    if (threads > laz->table.count) threads = laz->table.count;
+    if (threads <= 1) threads = 0;
+    size_t size = threads > 0 ? PART_SIZE_AHEAD : PART_SIZE;
+    laz->part_records = size / laz->format.record_length;
+    if (laz->part_records == 0) laz->part_records = 1;
+    return prep_ahead_create(&task, threads, &laz->ahead, err);
+}
+
+/* What does not fit into the part of a chunk that was decoded ahead is decoded here. */
+static bool next_part(prep_laz *laz, mospt_err *err)
+{
+    void *memory = laz->block;
+    laz->block_used = 0;
+    if (laz->ahead == NULL && !start_reading(laz, err)) return false;
+    if (laz->block != NULL && laz->block->has_more) {
+        if (!decode(laz, laz->block, err)) return false;
+    } else if (!prep_ahead_next(laz->ahead, &memory, err)) {
+        laz->block = NULL;
+        return false;
     }
+    laz->block = memory;
+    laz->is_at_end = laz->block == NULL || laz->block->number == laz->table.count;
+    if (!laz->is_at_end) note_damage(laz, laz->block);
     return true;
 }
 
@@ -188,24 +237,17 @@ bool prep_laz_read(prep_laz *laz, size_t most, const uint8_t **records, size_t *
 {
     *records = NULL;
     *count = 0;
-    while (laz->part_used == laz->part.count && !laz->is_at_end) {
-        laz->part_used = 0;
-        laz->part.count = 0;
-        if (!prepare(laz, err)) return false;
-        if (laz->ahead != NULL ? !prep_laz_ahead_next(laz->ahead, &laz->part, err)
-                               : !decode_here(laz, err))
-            return false;
-        note_damage(laz, laz->part.place, laz->part.damage, laz->part.damage_byte);
-        laz->is_at_end = laz->part.count == 0 && laz->part.damage == NULL;
+    while (!laz->is_at_end && (laz->block == NULL || laz->block_used == laz->block->count)) {
+        if (!next_part(laz, err)) return false;
     }
     if (laz->is_at_end) {
         stop_reading(laz);
         return true;
     }
-    *count = laz->part.count - laz->part_used;
+    *count = laz->block->count - laz->block_used;
     if (*count > most) *count = most;
-    *records = laz->part.records + laz->part_used * laz->format.record_length;
-    laz->part_used += *count;
+    *records = laz->block->records + laz->block_used * laz->format.record_length;
+    laz->block_used += *count;
     return true;
 }
 
@@ -221,15 +263,67 @@ uint32_t prep_laz_chunk_count(const prep_laz *laz)
     return laz->table.is_open ? 1 : laz->table.count;
 }
 
-bool prep_laz_look(prep_laz *laz, uint32_t place, uint8_t *records, size_t count, size_t *got,
+uint64_t prep_laz_chunk_first(const prep_laz *laz, uint32_t chunk)
+{
+    uint64_t first = 0;
+    for (uint32_t i = 0; i < chunk; i++)
+        first += laz->table.places[i].points;
+    return first;
+}
+
+/* The chunk of a point, and how many points stand before it there; table.count if it is unknown. */
+static uint32_t find_chunk(const prep_laz *laz, uint64_t point, uint64_t *lead)
+{
+    uint32_t chunk = 0, count = laz->table.count;
+    while (chunk < count && point >= laz->table.places[chunk].points)
+        point -= laz->table.places[chunk++].points;
+    *lead = point;
+    return chunk;
+}
+
+uint64_t prep_laz_lead(const prep_laz *laz, uint64_t point)
+{
+    uint64_t lead;
+    return find_chunk(laz, point, &lead) < laz->table.count ? lead : UINT64_MAX;
+}
+
+/* Reads `count` records of a chunk behind the first `lead`. */
+static bool look_into(prep_laz *laz, prep_laz_chunk *chunk, uint32_t number, uint64_t lead,
+                      uint8_t *records, size_t count, size_t *got, mospt_err *err)
+{
+    const prep_laz_place *p = &laz->table.places[number];
+    *got = 0;
+    if (!prep_laz_chunk_begin(chunk, laz->input, p->offset, p->size, p->points, true, err))
+        return false;
+    while (lead > 0) {
+        size_t skipped;
+        if (!prep_laz_chunk_read(chunk, records, lead < count ? (size_t)lead : count, &skipped,
+                                 err))
+            return false;
+        if (skipped == 0) return true;
+        lead -= skipped;
+    }
+    return prep_laz_chunk_read(chunk, records, count, got, err);
+}
+
+bool prep_laz_look(prep_laz *laz, uint64_t point, uint8_t *records, size_t count, size_t *got,
                    mospt_err *err)
 {
-    const prep_laz_place *p = &laz->table.places[place];
+    uint64_t lead;
+    uint32_t number = find_chunk(laz, point, &lead);
     prep_laz_chunk *chunk;
+    bool ok = true, is_whole = true;
     *got = 0;
     if (!prep_laz_chunk_create(&laz->format, &chunk, err)) return false;
-    bool ok = prep_laz_chunk_begin(chunk, laz->input, p->offset, p->size, p->points, true, err) &&
-              prep_laz_chunk_read(chunk, records, count, got, err);
+    for (; ok && is_whole && *got < count && number < laz->table.count; number++) {
+        uint64_t there = laz->table.places[number].points - lead;
+        size_t want = there < count - *got ? (size_t)there : count - *got, n;
+        ok = look_into(laz, chunk, number, lead, records + *got * laz->format.record_length, want,
+                       &n, err);
+        is_whole = n == want;
+        *got += n;
+        lead = 0;
+    }
     prep_laz_chunk_destroy(chunk);
     return ok;
 }

@@ -15,7 +15,6 @@
 enum {
     PREP_LAZ_CHUNKS_MAX = 1 << 22,
     PREP_LAZ_EXTRA_MAX = 4096, /* extra bytes of a record; each has a kilobyte of models */
-    PREP_LAZ_THREADS_MAX = 8,
 };
 
 typedef enum {
@@ -83,7 +82,7 @@ typedef struct prep_laz prep_laz;
 
 /* Finds the chunks. No threads and no large buffers before the first read.
  * input    borrowed until close; only prep_input_read_at() is used
- * threads  that decode; 0: one per processor, at most PREP_LAZ_THREADS_MAX
+ * threads  that decode; 0: prep_ahead_thread_count()
  * errors   MOSPT_EFORMAT, MOSPT_EIO, MOSPT_ENOMEM */
 bool prep_laz_open(prep_input *input, const prep_las_header *header, uint32_t threads,
                    prep_laz **out, mospt_err *err);
@@ -107,13 +106,18 @@ bool prep_laz_read(prep_laz *laz, size_t most, const uint8_t **records, size_t *
 /* Goes back to the first record. */
 void prep_laz_rewind(prep_laz *laz);
 
-/* Chunks that can be looked at by number; 1 if the others are found only by decoding. */
+/* Chunks whose place is known; 1 if the others are found only by decoding. */
 uint32_t prep_laz_chunk_count(const prep_laz *laz);
+uint64_t prep_laz_chunk_first(const prep_laz *laz, uint32_t chunk); /* point */
 
-/* Reads the first records of a chunk, without disturbing prep_laz_read().
+/* Points that stand before `point` in its chunk, and have to be decoded to look at it; UINT64_MAX
+ * if its chunk's place is not known. */
+uint64_t prep_laz_lead(const prep_laz *laz, uint64_t point);
+
+/* Reads records from any point whose chunk is known, without disturbing prep_laz_read().
  * records  [count * record_length]
- * got      out, at most `count` */
-bool prep_laz_look(prep_laz *laz, uint32_t chunk, uint8_t *records, size_t count, size_t *got,
+ * got      out, at most `count`; fewer at the end of the known chunks, or at damage */
+bool prep_laz_look(prep_laz *laz, uint64_t point, uint8_t *records, size_t count, size_t *got,
                    mospt_err *err);
 
 /* What is wrong with the file as far as it was read; NULL if nothing was found. The first fault is

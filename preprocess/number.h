@@ -1,8 +1,10 @@
 /* preprocess/number.h - decimal numbers from text, fast, and the same bits as strtod() in the C
  * locale.
  *
- * Up to 19 digits and a small power of ten are exact in one multiplication or division (Clinger,
- * How to Read Floating Point Numbers Accurately, PLDI 1990); what is not goes to strtod(). */
+ * Below 2^53, digits and a small power of ten make a double in one multiplication or division
+ * (Clinger, How to Read Floating Point Numbers Accurately, PLDI 1990). Up to 19 digits and powers
+ * up to 10^27 are exact in integers of 128 bits. Of longer numbers, the first 19 digits are an
+ * interval whose ends are mostly the same double. What is left goes to strtod(). */
 #pragma once
 #include <stdbool.h>
 

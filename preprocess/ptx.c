@@ -187,12 +187,12 @@ static bool understand(prep_scan *scan, ptx_state *ptx, mospt_err *err)
 static bool ptx_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,
                      mospt_err *err)
 {
-    (void)options;
     prep_scan_info *info = &scan->info;
     ptx_state *ptx = calloc(1, sizeof *ptx);
     if (ptx == NULL) return mospt_err_nomem(err, sizeof *ptx);
     scan->state = ptx;
-    if (!prep_ptx_find(scan->input, index, &ptx->scan, &info->scan_count, &ptx->has_more, err))
+    if (!prep_ptx_find(scan->input, options->memory, index, &ptx->scan, &info->scan_count,
+                       &ptx->has_more, err))
         return false;
     if (index >= info->scan_count) return true; /* scan.c says so */
     if (info->scan_count > 1) snprintf(info->name, sizeof info->name, "scan %u", index + 1);

@@ -12,9 +12,7 @@
  *
  * The grid that a header declares is not believed: a scan goes on until the next header, or the end
  * of the file. Finding the headers takes one walk over the whole file, which counts lines but
- * parses none of them; what it finds is remembered as long as the program runs, so that opening
- * scan after scan of a file walks over it once; a file that changed within the last seconds is not.
- */
+ * parses none of them; a prep_scan_memory keeps what it finds for the next scan. */
 #pragma once
 #include "preprocess/scan_format.h"
 
@@ -35,9 +33,9 @@ typedef struct {
 } prep_ptx_scan;
 
 /* Finds scan `index`. Scans that neither declare nor hold points do not count, if there are others.
+ * memory       NULL: none
  * out          written if index < *scan_count
  * has_more     out, the file holds more than PREP_PTX_SCANS_MAX scans
- * errors       MOSPT_EFORMAT, MOSPT_EEMPTY, MOSPT_EIO, MOSPT_ENOMEM
- * threads      any; the memory of files seen is shared */
-bool prep_ptx_find(prep_input *input, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
-                   bool *has_more, mospt_err *err);
+ * errors       MOSPT_EFORMAT, MOSPT_EEMPTY, MOSPT_EIO, MOSPT_ENOMEM */
+bool prep_ptx_find(prep_input *input, prep_scan_memory *memory, uint32_t index, prep_ptx_scan *out,
+                   uint32_t *scan_count, bool *has_more, mospt_err *err);

@@ -1,21 +1,15 @@
 #include "preprocess/number.h"
 #include "preprocess/ptx.h"
 
-#include <inttypes.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <time.h>
 
 enum {
     WINDOW_SIZE = 256 * 1024,
     HEADER_SIZE_MAX = 4096,
     HEADER_LINES = 10,
     COUNT_LINE_MAX = 32, /* a line that holds one integer and nothing else is not longer */
-    CACHE_FILES = 256,
-    CACHE_SCANS = 8 * 1024, /* of all files together, about 1.5 MiB */
 };
 
 /* How many numbers stand on each line of a header. */
@@ -250,116 +244,37 @@ static bool drop_empty(walk *w, scan_list *list, mospt_err *err)
     return true;
 }
 
-static bool walk_file(prep_input *input, scan_list *out, mospt_err *err)
+static void free_list(void *index)
 {
-    scan_list list = {0};
+    scan_list *list = index;
+    free(list->scans);
+    free(list);
+}
+
+static scan_list *walk_file(prep_input *input, mospt_err *err)
+{
+    scan_list *list = calloc(1, sizeof *list);
     walk w = {.input = input, .buffer = malloc(WINDOW_SIZE)};
-    if (w.buffer == NULL) return mospt_err_nomem(err, WINDOW_SIZE);
-    bool ok = prep_input_seek(input, 0, err) && find_headers(&w, &list, err) &&
-              drop_empty(&w, &list, err);
+    bool ok = list != NULL && w.buffer != NULL;
+    if (!ok) mospt_err_nomem(err, WINDOW_SIZE);
+    ok = ok && prep_input_seek(input, 0, err) && find_headers(&w, list, err) &&
+         drop_empty(&w, list, err);
     free(w.buffer);
-    if (ok) *out = list;
-    else free(list.scans);
-    return ok;
+    if (ok) return list;
+    if (list != NULL) free_list(list);
+    return NULL;
 }
 
-/* The files walked over last. It is shared by all readers and outlives them, unlike anything else
- * here: the scans of a file are opened one by one, by their number, and each of them would have to
- * walk over all that come before. */
-typedef struct {
-    dev_t device;
-    ino_t inode;
-    off_t size;
-    struct timespec modified;
-} file_key;
-
-static struct {
-    pthread_mutex_t lock; /* guards all of it */
-    struct {
-        file_key key;
-        scan_list list;
-    } entry[CACHE_FILES]; /* oldest first */
-    uint32_t count, scan_count;
-} cache = {.lock = PTHREAD_MUTEX_INITIALIZER};
-
-static bool make_key(const char *path, file_key *out)
+bool prep_ptx_find(prep_input *input, prep_scan_memory *memory, uint32_t index, prep_ptx_scan *out,
+                   uint32_t *scan_count, bool *has_more, mospt_err *err)
 {
-    struct stat st;
-    if (stat(path, &st) != 0) return false;
-    *out = (file_key){st.st_dev, st.st_ino, st.st_size, st.st_mtim};
-    return true;
-}
-
-static bool is_same(const file_key *a, const file_key *b)
-{
-    return a->device == b->device && a->inode == b->inode && a->size == b->size &&
-           a->modified.tv_sec == b->modified.tv_sec && a->modified.tv_nsec == b->modified.tv_nsec;
-}
-
-static void pick(const scan_list *list, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
-                 bool *has_more)
-{
+    const scan_list *known = prep_scan_memory_recall(memory, input, free_list);
+    scan_list *walked = known == NULL ? walk_file(input, err) : NULL;
+    const scan_list *list = known != NULL ? known : walked;
+    if (list == NULL) return false;
     if (index < list->count) *out = list->scans[index];
     *scan_count = list->count;
     *has_more = list->has_more;
-}
-
-static bool recall(const file_key *key, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
-                   bool *has_more)
-{
-    bool found = false;
-    pthread_mutex_lock(&cache.lock);
-    for (uint32_t i = cache.count; i-- > 0 && !found;) {
-        found = is_same(&cache.entry[i].key, key);
-        if (found) pick(&cache.entry[i].list, index, out, scan_count, has_more);
-    }
-    pthread_mutex_unlock(&cache.lock);
-    return found;
-}
-
-static void forget_oldest(void)
-{
-    cache.scan_count -= cache.entry[0].list.count;
-    free(cache.entry[0].list.scans);
-    cache.count--;
-    memmove(&cache.entry[0], &cache.entry[1], cache.count * sizeof cache.entry[0]);
-}
-
-/* A file that was written just now may be written again without its time telling. */
-static bool is_settled(const file_key *key)
-{
-    struct timespec now;
-    return clock_gettime(CLOCK_REALTIME, &now) == 0 && now.tv_sec - key->modified.tv_sec > 2;
-}
-
-/* Takes the list. */
-static void remember(const file_key *key, scan_list *list)
-{
-    if (list->count > CACHE_SCANS || !is_settled(key)) {
-        free(list->scans);
-        return;
-    }
-    pthread_mutex_lock(&cache.lock);
-    while (cache.count == CACHE_FILES || cache.scan_count + list->count > CACHE_SCANS)
-        forget_oldest();
-    prep_ptx_scan *fitted = realloc(list->scans, list->count * sizeof *fitted);
-    if (fitted != NULL) list->scans = fitted;
-    cache.entry[cache.count].key = *key;
-    cache.entry[cache.count++].list = *list;
-    cache.scan_count += list->count;
-    pthread_mutex_unlock(&cache.lock);
-}
-
-bool prep_ptx_find(prep_input *input, uint32_t index, prep_ptx_scan *out, uint32_t *scan_count,
-                   bool *has_more, mospt_err *err)
-{
-    file_key key;
-    bool has_key = make_key(prep_input_path(input), &key);
-    if (has_key && recall(&key, index, out, scan_count, has_more)) return true;
-    scan_list list;
-    if (!walk_file(input, &list, err)) return false;
-    pick(&list, index, out, scan_count, has_more);
-    if (has_key) remember(&key, &list);
-    else free(list.scans);
+    if (walked != NULL) prep_scan_memory_keep(memory, input, walked, free_list);
     return true;
 }

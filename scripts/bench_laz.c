@@ -5,6 +5,7 @@
  * One line per file and number of threads: millions of points per second of wall time and of
  * processor time, the best of five passes, and how many times faster than with one thread. Every
  * pass must deliver the same bytes. */
+#include "preprocess/ahead.h"
 #include "preprocess/laz.h"
 
 #include <inttypes.h>
@@ -72,7 +73,7 @@ static bool bench_file(const char *path, mospt_err *err)
     bool ok = prep_las_header_read(input, &h, err);
     pass best = {0};
     double alone_s = 0;
-    for (uint32_t threads = 1; threads <= PREP_LAZ_THREADS_MAX && ok; threads *= 2) {
+    for (uint32_t threads = 1; threads <= PREP_AHEAD_THREADS_MAX && ok; threads *= 2) {
         ok = bench(input, &h, threads, &best, err);
         if (!ok) break;
         if (threads == 1) alone_s = best.wall_s;

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LAS_HEADER = 227, LAS_RECORD = 20 };
+enum { LAS_HEADER = 227, LAS_VLR = 54, GEOKEYS = 16, LAS_RECORD = 20 };
 
 static FILE *open_file(const char *path)
 {
@@ -14,15 +14,27 @@ static FILE *open_file(const char *path)
     return f;
 }
 
+/* A record of GeoTIFF keys with the code of a projected system. */
+static void put_geokeys(uint8_t *p, uint16_t epsg)
+{
+    const uint16_t keys[GEOKEYS / 2] = {1, 1, 0, 1, 3072, 0, 1, epsg};
+    memcpy(p + 2, "LASF_Projection", 15);
+    memcpy(p + 18, &(uint16_t){34735}, 2);
+    memcpy(p + 20, &(uint16_t){GEOKEYS}, 2);
+    memcpy(p + LAS_VLR, keys, GEOKEYS);
+}
+
 void core_las_write(const char *path, const core_las *las)
 {
     uint8_t h[LAS_HEADER] = "LASF";
-    size_t size = LAS_HEADER + (size_t)las->count * LAS_RECORD;
+    uint32_t begin = LAS_HEADER + (las->epsg != 0 ? LAS_VLR + GEOKEYS : 0);
+    size_t size = begin + (size_t)las->count * LAS_RECORD;
     uint8_t *bytes = calloc(1, size);
     if (bytes == NULL) abort();
     h[24] = 1, h[25] = 2;
     memcpy(h + 94, &(uint16_t){LAS_HEADER}, 2);
-    memcpy(h + 96, &(uint32_t){LAS_HEADER}, 4);
+    memcpy(h + 96, &begin, 4);
+    memcpy(h + 100, &(uint32_t){las->epsg != 0}, 4);
     memcpy(h + 105, &(uint16_t){LAS_RECORD}, 2);
     memcpy(h + 107, &las->count, 4);
     memcpy(h + 111, &las->count, 4);
@@ -39,8 +51,9 @@ void core_las_write(const char *path, const core_las *las)
         memcpy(h + 187 + 16 * a, &low, 8);
     }
     memcpy(bytes, h, LAS_HEADER);
+    if (las->epsg != 0) put_geokeys(bytes + LAS_HEADER, las->epsg);
     for (uint32_t i = 0; i < las->count; i++) {
-        uint8_t *r = bytes + LAS_HEADER + (size_t)i * LAS_RECORD;
+        uint8_t *r = bytes + begin + (size_t)i * LAS_RECORD;
         memcpy(r, las->xyz[i], 12);
         memcpy(r + 12, &(uint16_t){(uint16_t)i}, 2);
         r[14] = 1 | 1 << 3;

@@ -8,6 +8,7 @@ typedef struct {
     const int32_t (*xyz)[3]; /* [count] */
     uint32_t count;
     const double *low, *high; /* [3] bounds in the header; NULL: the true ones */
+    uint16_t epsg;            /* code of its coordinate reference system; 0: it says nothing */
     uint32_t missing;         /* bytes that the file is shorter than it should be */
 } core_las;
 

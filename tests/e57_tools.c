@@ -58,12 +58,13 @@ void e57_add_rgb(e57_made *m, int64_t high)
         e57_add(m, e57_whole(names[c], e57_v.number[c], 0, high));
 }
 
-bool e57_load_scan(const char *path, uint32_t index, uint32_t capacity, e57_loaded *out,
-                   mospt_err *err)
+bool e57_load_scan(const char *path, uint32_t index, prep_scan_memory *memory, uint32_t capacity,
+                   e57_loaded *out, mospt_err *err)
 {
     prep_scan *scan;
+    const prep_scan_options options = {.memory = memory};
     *out = (e57_loaded){0};
-    if (!prep_scan_open(path, index, NULL, &scan, err)) return false;
+    if (!prep_scan_open(path, index, &options, &scan, err)) return false;
     out->info = *prep_scan_describe(scan);
     assert_true(prep_batch_init(&out->batch, &out->info.attributes, capacity, err));
     assert_true(prep_scan_read(scan, &out->batch, err));
@@ -82,8 +83,8 @@ void e57_unload(e57_loaded *l)
 void e57_load_bytes(const uint8_t *bytes, size_t size, uint32_t index, e57_loaded *out)
 {
     mospt_err err = {0};
-    if (!e57_load_scan(scan_points_file("a.e57", bytes, size), index, 2 * E57_COUNT, out, &err))
-        fail_msg("%s", err.message);
+    const char *path = scan_points_file("a.e57", bytes, size);
+    if (!e57_load_scan(path, index, NULL, 2 * E57_COUNT, out, &err)) fail_msg("%s", err.message);
 }
 
 void e57_load_file(const write_e57_file *file, uint32_t index, e57_loaded *out)
@@ -105,7 +106,7 @@ mospt_err e57_refuse_bytes(const uint8_t *bytes, size_t size)
     e57_loaded l;
     mospt_err err = {0};
     const char *path = scan_points_file("a.e57", bytes, size);
-    assert_false(e57_load_scan(path, 0, 100, &l, &err));
+    assert_false(e57_load_scan(path, 0, NULL, 100, &l, &err));
     assert_string_equal(err.file, path);
     return err;
 }

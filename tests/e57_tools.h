@@ -42,9 +42,9 @@ typedef struct {
     char crs[256];
 } e57_loaded;
 
-/* Reads scan `index`; at most `capacity` points of it. */
-bool e57_load_scan(const char *path, uint32_t index, uint32_t capacity, e57_loaded *out,
-                   mospt_err *err);
+/* Reads scan `index`; at most `capacity` points of it. `memory` may be NULL. */
+bool e57_load_scan(const char *path, uint32_t index, prep_scan_memory *memory, uint32_t capacity,
+                   e57_loaded *out, mospt_err *err);
 void e57_unload(e57_loaded *l);
 
 /* The same for bytes, a file and a scan that must be readable; the scan without damage. */

@@ -18,7 +18,7 @@ static void look_at_some(prep_laz *laz, size_t length)
     size_t got;
     mospt_err err;
     for (uint32_t i = 0; records != NULL && i < count && i < 4; i++)
-        prep_laz_look(laz, count - 1 - i, records, 16, &got, &err);
+        prep_laz_look(laz, prep_laz_chunk_first(laz, count - 1 - i) + i, records, 16, &got, &err);
     free(records);
 }
 

@@ -11,10 +11,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 static void read_others(const char *path)
 {
     uint32_t count = SCANS_MAX;
+    prep_scan_options options = {0};
+    if (!prep_scan_memory_create(&options.memory, NULL)) abort();
     for (uint32_t i = 0; i < count && i < SCANS_MAX; i++) {
         prep_scan *scan;
         prep_batch batch;
-        if (!prep_scan_open(path, i, NULL, &scan, NULL)) abort();
+        if (!prep_scan_open(path, i, &options, &scan, NULL)) abort();
         count = prep_scan_describe(scan)->scan_count;
         if (!prep_batch_init(&batch, &prep_scan_describe(scan)->attributes, 100, NULL)) abort();
         do {
@@ -23,6 +25,7 @@ static void read_others(const char *path)
         prep_batch_fini(&batch);
         prep_scan_close(scan);
     }
+    prep_scan_memory_destroy(options.memory);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -11,6 +11,7 @@ foreach(name
     test_number
     test_ply
     test_real_scans
+    test_scan_memory
     test_text)
     add_executable(${name} ${name}.c)
     target_link_libraries(${name} PRIVATE readers_fixture)

@@ -1,11 +1,13 @@
 #include "tests/e57_tools.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <cmocka.h>
 
@@ -548,7 +550,7 @@ static void scans_are_counted_without_the_empty_and_the_broken(void **state)
     mospt_err err = {0};
     char path[1024];
     snprintf(path, sizeof path, "%s/a.e57", scan_points_folder());
-    assert_false(e57_load_scan(path, 3, 100, &l, &err));
+    assert_false(e57_load_scan(path, 3, NULL, 100, &l, &err));
     assert_int_equal(err.code, MOSPT_EINVAL);
     assert_int_equal(e57_refuse_file(&(write_e57_file){.scans = scans, .scan_count = 1}).code,
                      MOSPT_EEMPTY);
@@ -556,6 +558,49 @@ static void scans_are_counted_without_the_empty_and_the_broken(void **state)
     err = e57_refuse_file(&(write_e57_file){.scans = scans, .scan_count = 2});
     assert_int_equal(err.code, MOSPT_EFORMAT);
     assert_non_null(strstr(err.message, "prototype"));
+}
+
+/* That the XML is not read again shows in a file that has lost it since, and whose size and times
+ * are what they were. */
+static void a_memory_spares_the_xml_for_the_next_scan(void **state)
+{
+    (void)state;
+    e57_made m[3];
+    write_e57_scan scans[3];
+    char names[3][20];
+    for (int i = 0; i < 3; i++) {
+        e57_begin(&m[i]);
+        for (int k = 0; k < 2 * i; k++)
+            e57_add_rgb(&m[i], 255);
+        scans[i] = m[i].scan;
+        scans[i].count = (uint32_t)(10 * (i + 1));
+        snprintf(names[i], sizeof names[i], "station %d", i);
+        scans[i].name = names[i];
+    }
+    scans[1].lacks_prototype = true;
+    size_t size;
+    uint8_t *bytes =
+        write_e57(&(write_e57_file){.scans = scans, .scan_count = 3, .crs = "EPSG:25832"}, &size);
+    const struct timespec old[2] = {{.tv_sec = 1000}, {.tv_sec = 1000}};
+    prep_scan_memory *memory;
+    assert_true(prep_scan_memory_create(&memory, NULL));
+    for (uint32_t i = 0; i < 2; i++) {
+        const char *path = scan_points_file("a.e57", bytes, size);
+        assert_int_equal(utimensat(AT_FDCWD, path, old, 0), 0);
+        e57_loaded l;
+        mospt_err err = {0};
+        if (!e57_load_scan(path, i, memory, E57_COUNT, &l, &err)) fail_msg("%s", err.message);
+        assert_int_equal(l.info.scan_count, 2);
+        assert_int_equal(l.batch.count, i == 0 ? 10 : 30);
+        assert_string_equal(l.info.name, names[2 * i]);
+        assert_string_equal(l.crs, "EPSG:25832");
+        assert_int_equal(l.damage.code, i == 0 ? MOSPT_EFORMAT : MOSPT_OK);
+        e57_unload(&l);
+        memset(bytes + size - 300, 'x', 300);
+    }
+    e57_refuse_bytes(bytes, size);
+    prep_scan_memory_destroy(memory);
+    free(bytes);
 }
 
 static void coordinates_are_needed(void **state)
@@ -584,7 +629,7 @@ static bool measure(const char *path, totals *t, mospt_err *err)
         t->low[a] = INFINITY, t->high[a] = -INFINITY;
     for (uint32_t i = 0; i < t->scans; i++) {
         e57_loaded l;
-        if (!e57_load_scan(path, i, 200000, &l, err)) return false;
+        if (!e57_load_scan(path, i, NULL, 200000, &l, err)) return false;
         t->scans = l.info.scan_count;
         t->count += l.batch.count;
         for (size_t k = 0; k < 3 * (size_t)l.batch.count; k++) {
@@ -664,6 +709,7 @@ int main(void)
         cmocka_unit_test(intensity_is_stretched_and_kept),
         cmocka_unit_test(fields_get_the_names_of_the_field),
         cmocka_unit_test(scans_are_counted_without_the_empty_and_the_broken),
+        cmocka_unit_test(a_memory_spares_the_xml_for_the_next_scan),
         cmocka_unit_test(coordinates_are_needed),
         cmocka_unit_test(real_files_hold_what_their_manifest_says),
     };

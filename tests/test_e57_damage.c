@@ -71,7 +71,7 @@ static void a_damaged_page_takes_only_its_own_points(void **state)
         const char *path = scan_points_file("a.e57", bytes, size);
         e57_loaded l;
         mospt_err err = {0};
-        if (e57_load_scan(path, 0, 2000, &l, &err)) {
+        if (e57_load_scan(path, 0, NULL, 2000, &l, &err)) {
             assert_int_equal(l.damage.code, MOSPT_EFORMAT);
             assert_int_equal(l.damage.place_kind, MOSPT_AT_BYTE);
             assert_true(l.batch.count < 1000);

@@ -1,5 +1,6 @@
 #include "preprocess/bytes.h"
 #include "preprocess/laz.h"
+#include "tests/laz_twins.h"
 #include "tests/scan_points.h"
 #include "tests/write_las.h"
 #include "tests/write_laz.h"
@@ -9,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -237,6 +237,18 @@ static void long_chunks_leave_no_trace_of_windows(void **state)
     }
 }
 
+/* Chunks that are larger than what is decoded of them ahead, with one that is not behind them. */
+static void large_chunks_come_in_parts(void **state)
+{
+    (void)state;
+    image las = make_las(3, 20000, 500, 17);
+    image laz = pack(las, (write_laz_options){.chunk_points = 9000});
+    for (uint32_t threads = 1; threads <= 3; threads++)
+        check_same(las, laz, threads, 1000);
+    free(laz.bytes);
+    free(las.bytes);
+}
+
 static void chunks_of_every_kind_come_in_order(void **state)
 {
     (void)state;
@@ -285,23 +297,28 @@ static void a_file_can_be_read_again_from_any_place(void **state)
     free(las.bytes);
 }
 
-static void chunks_can_be_looked_at_alone(void **state)
+static void any_place_can_be_looked_at(void **state)
 {
     (void)state;
     image las = make_las(8, COUNT, 3, 2), laz = pack(las, (write_laz_options){.chunk_points = 100});
     opened o;
     mospt_err err;
-    uint8_t records[60 * 100];
+    uint8_t records[60 * 250];
     assert_true(open_image(laz, 2, &o, &err));
     assert_int_equal(prep_laz_chunk_count(o.laz), 12);
     size_t length = o.header.record_length, got;
-    for (uint32_t i = 12; i-- > 0;) {
-        assert_true(prep_laz_look(o.laz, i, records, 20 + i, &got, &err));
-        assert_int_equal(got, 20 + i);
-        assert_memory_equal(records, records_of(las) + (size_t)i * 100 * length, got * length);
+    assert_true(sizeof records >= 250 * length);
+    for (uint32_t first = 0; first < COUNT; first += 37) {
+        size_t want = first % 250 + 1, there = COUNT - first < want ? COUNT - first : want;
+        assert_int_equal(prep_laz_lead(o.laz, first), first % 100);
+        assert_true(prep_laz_look(o.laz, first, records, want, &got, &err));
+        assert_int_equal(got, there);
+        assert_memory_equal(records, records_of(las) + first * length, got * length);
     }
-    assert_true(prep_laz_look(o.laz, 11, records, 100, &got, &err));
-    assert_int_equal(got, 100);
+    assert_int_equal(prep_laz_chunk_first(o.laz, 11), 1100);
+    assert_int_equal(prep_laz_lead(o.laz, COUNT), UINT64_MAX);
+    assert_true(prep_laz_look(o.laz, COUNT, records, 1, &got, &err));
+    assert_int_equal(got, 0);
     assert_null(prep_laz_damage(o.laz));
     close_image(&o);
     free(laz.bytes);
@@ -616,45 +633,16 @@ static void a_scan_reads_like_its_uncompressed_twin(void **state)
     }
 }
 
-static bool find_scans(char *root, size_t size)
-{
-    const char *shared = getenv("IPTS_SHARED");
-    if (shared != NULL) snprintf(root, size, "%s/scans", shared);
-    else snprintf(root, size, "%s/../shared/scans", IPTS_SOURCE_DIR);
-    return access(root, R_OK) == 0;
-}
-
 /* Files made by other programs, beside the LAS that they were made from. */
 static void real_files_read_like_their_twins(void **state)
 {
     (void)state;
-    static const char *const pairs[][2] = {
-        {"laz/laz-perf__point10-1.0.laz", "las/laz-perf__point10-1.0.las"},
-        {"laz/laz-perf__point10.las.laz", "las/laz-perf__point10.las"},
-        {"laz/laz-perf__point-time.las.laz", "las/laz-perf__point-time.las"},
-        {"laz/laz-perf__point-color.las.laz", "las/laz-perf__point-color.las"},
-        {"laz/laspy__extra.laz", "las/laz-perf__extrabytes.las"},
-        {"laz/laspy__simple.laz", "las/pdal__las__simple.las"},
-        {"laz/pdal__laz__simple.laz", "las/pdal__las__simple.las"},
-        {"laz/pdal__laz__simple-laszip-compressor-version-1.2r0.laz", "las/pdal__las__simple.las"},
-        {"laz/pdal__laszip__laszip-generated.laz", "las/pdal__las__1.2-with-color.las"},
-        {"laz/pdal__laszip__liblas-generated.laz", "las/pdal__las__1.2-with-color.las"},
-        {"laz/libLAS__1.2-with-color.laz", "las/pdal__las__1.2-with-color.las"},
-        {"laz/pdal__laz__autzen_trim.laz", "las/pdal__las__autzen_trim.las"},
-        {"laz/rlas__example.laz", "las/rlas__example.las"},
-        {"laz/olv__tiny.laz", "las/olv__tiny.las"},
-        {"laz/loaders.gl__cpp__Model3DTiler__test__resources__ripple.laz",
-         "las/loaders.gl__cpp__Model3DTiler__test__resources__ripple.las"},
-        {"laz/loaders.gl__las__pdrf4-1.3.laz", "las/loaders.gl__las__pdrf4-1.3.las"},
-        {"laz/loaders.gl__las__pdrf6-1.4.laz", "las/loaders.gl__las__pdrf6-1.4.las"},
-        {"laz/loaders.gl__las__pdrf8-1.4.laz", "las/loaders.gl__las__pdrf8-1.4.las"},
-    };
-    char root[1024], path[2048];
-    if (!find_scans(root, sizeof root)) skip();
-    for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; i++) {
+    char path[2048];
+    if (!laz_twins_path(0, 0, path, sizeof path)) skip();
+    for (size_t i = 0; i < laz_twins_count; i++) {
         image file[2];
         for (int k = 0; k < 2; k++) {
-            snprintf(path, sizeof path, "%s/%s", root, pairs[i][k]);
+            assert_true(laz_twins_path(i, k, path, sizeof path));
             FILE *f = fopen(path, "rb");
             if (f == NULL) fail_msg("cannot open %s", path);
             fseek(f, 0, SEEK_END);
@@ -676,9 +664,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_format_and_version_comes_back),
         cmocka_unit_test(long_chunks_leave_no_trace_of_windows),
+        cmocka_unit_test(large_chunks_come_in_parts),
         cmocka_unit_test(chunks_of_every_kind_come_in_order),
         cmocka_unit_test(a_file_can_be_read_again_from_any_place),
-        cmocka_unit_test(chunks_can_be_looked_at_alone),
+        cmocka_unit_test(any_place_can_be_looked_at),
         cmocka_unit_test(a_chunk_in_memory_is_decoded_alone),
         cmocka_unit_test(wave_packets_can_be_left_out_of_layers),
         cmocka_unit_test(a_missing_or_bogus_table_costs_no_points),

@@ -72,6 +72,19 @@ static void known_numbers_are_as_strtod_reads_them(void **state)
         "1e5e5",
         "100000000000000000000000000000000000000000000000000000000000e-60",
         "8.5e-7",
+        "512345.12345678901234",
+        "0.00000000000000000000000000000",
+        "-0.0000000000000000000e77",
+        "9999999999999999999",
+        "9999999999999999999.9e-27",
+        "9007199254740993e-27",
+        "9007199254740993e27",
+        "1000000000000000000000000001e-27",
+        "9223372036854775808",
+        "9223372036854776832",
+        "9223372036854776833",
+        "18446744073709550591.99999999999999",
+        "000000000000000000000000000000000000123.4567890123456789012345",
         "1630577758.569490"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         check(texts[i]);
@@ -105,6 +118,61 @@ static void random_numbers_are_as_strtod_reads_them(void **state)
                      scan_points_random(&seed) % 100000,
                      (int)(scan_points_random(&seed) % 60) - 30);
         }
+        check(text);
+    }
+}
+
+/* `count` digits with a point somewhere among them, or before or behind all. */
+static size_t write_digits(uint64_t *seed, int count, char *out)
+{
+    int point = (int)(scan_points_random(seed) % (uint32_t)(count + 4)) - 2;
+    size_t n = 0;
+    if (scan_points_random(seed) % 8 == 0) out[n++] = '-';
+    if (point <= 0) n += (size_t)sprintf(out + n, "0.%.*s", -point, "00");
+    for (int i = 0; i < count; i++) {
+        if (i == point && i > 0) out[n++] = '.';
+        out[n++] = (char)('0' + scan_points_random(seed) % 10);
+    }
+    out[n] = '\0';
+    return n;
+}
+
+static void numbers_with_many_digits_are_as_strtod_reads_them(void **state)
+{
+    (void)state;
+    uint64_t seed = 11;
+    char text[128];
+    for (int i = 0; i < 4000000; i++) {
+        size_t n = write_digits(&seed, 15 + (int)(scan_points_random(&seed) % 11), text);
+        if (i % 4 == 0) sprintf(text + n, "e%d", (int)(scan_points_random(&seed) % 80) - 45);
+        check(text);
+    }
+}
+
+/* Halfway between two doubles, and a last digit above or below: what a shortcut gets wrong first.
+ */
+static void halves_are_as_strtod_reads_them(void **state)
+{
+    (void)state;
+    uint64_t seed = 13;
+    char text[256];
+    for (int i = 0; i < 300000; i++) {
+        uint64_t bits = (uint64_t)scan_points_random(&seed) << 33 ^
+                        (uint64_t)scan_points_random(&seed) << 11 ^ scan_points_random(&seed);
+        int shift = (int)(scan_points_random(&seed) % 110) - 60;
+        uint64_t odd =
+            (bits >> 10 | 1ull << 53 | 1) & ((1ull << 54) - 1); /* 54 bits, the last set */
+        long double half = ldexpl((long double)odd, -shift);
+        int n = snprintf(text, sizeof text, "%.*Lf", shift > 0 ? shift : 0, half);
+        check(text);
+        if (shift <= 0) continue;
+        text[n - 1]++; /* it was 5 */
+        check(text);
+        text[n - 1] = '4';
+        check(text);
+        snprintf(text + n, sizeof text - (size_t)n, "99999");
+        check(text);
+        snprintf(text, sizeof text, "%.*Lf00000000001", shift, half);
         check(text);
     }
 }
@@ -191,6 +259,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(known_numbers_are_as_strtod_reads_them),
         cmocka_unit_test(random_numbers_are_as_strtod_reads_them),
+        cmocka_unit_test(numbers_with_many_digits_are_as_strtod_reads_them),
+        cmocka_unit_test(halves_are_as_strtod_reads_them),
         cmocka_unit_test(what_is_no_number_is_named),
         cmocka_unit_test(other_text_is_refused),
         cmocka_unit_test(nothing_behind_the_end_is_read),
