@@ -106,6 +106,10 @@ static bool o_columns(cli_options *o, const char *v)
 {
     return (o->columns = v)[0] != '\0';
 }
+static bool o_attributes(cli_options *o, const char *v)
+{
+    return (o->attributes = v)[0] != '\0';
+}
 static bool o_poses(cli_options *o, const char *v)
 {
     return (o->poses = v)[0] != '\0';
@@ -133,6 +137,10 @@ static bool o_force(cli_options *o, const char *v)
 static bool o_each(cli_options *o, const char *v)
 {
     return (void)v, o->each = true;
+}
+static bool o_dedupe(cli_options *o, const char *v)
+{
+    return (void)v, o->dedupe = true;
 }
 static bool o_quiet(cli_options *o, const char *v)
 {
@@ -280,11 +288,15 @@ static const struct {
      "levels of the octree inside each node, 1 to 9 (default: 7)"},
     {"columns", "NAMES", 0, B | V | S, o_columns,
      "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
+    {"attributes", "NAMES", 0, B | V | S, o_attributes,
+     "those to keep, as in intensity,classification, or none (default: all)"},
     {"poses", "FILE", 0, B | V | S | I, o_poses,
      "moves scans: lines of a file name and a 4 x 4 matrix (NAME.pose.txt beside a scan does it "
      "too)"},
     {"crop", "BOX", 0, B | V | S | I, o_crop,
      "keep what is inside X0,Y0,Z0,X1,Y1,Z1; the rest is counted"},
+    {"dedupe", NULL, 0, B | V | S, o_dedupe,
+     "of points at one position, keep only the first; the rest is counted"},
     {"crs", "TEXT", 0, B | V, o_crs,
      "coordinate reference system to note (default: what the scans say)"},
     {"budget", "POINTS", 0, V | S, o_budget,

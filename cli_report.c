@@ -5,8 +5,9 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
-enum { UNKNOWN_SHOWN = 10 };
+enum { UNKNOWN_SHOWN = 10, CRS_SHOWN = 3 };
 
 void cli_report_losses(const prep_build_result *r)
 {
@@ -66,6 +67,35 @@ static void print_reasons(FILE *out, const mospt_metadata *m)
         }
 }
 
+/* One line if some scans state another coordinate reference system than the dataset has, with an
+ * example of each. */
+static void print_other_crs(FILE *out, const mospt_metadata *m)
+{
+    char site[CLI_CRS_NAME_SIZE], names[CRS_SHOWN + 1][CLI_CRS_NAME_SIZE];
+    const char *examples[CRS_SHOWN];
+    uint32_t others = 0, shown = 0;
+    bool has_more = false;
+    cli_crs_name(m->crs, site);
+    for (uint32_t i = 0; i < m->source_count; i++) {
+        if (m->sources[i].crs == NULL) continue;
+        cli_crs_name(m->sources[i].crs, names[shown]);
+        if (strcasecmp(names[shown], site) == 0) continue;
+        uint32_t k = 0;
+        while (strcasecmp(names[k], names[shown]) != 0)
+            k++;
+        others++;
+        if (k == CRS_SHOWN) has_more = true;
+        else if (k == shown) examples[shown++] = m->sources[i].name;
+    }
+    if (others == 0) return;
+    fprintf(out,
+            "  crs        %" PRIu32 " of %" PRIu32 " scans state another one than %s: ", others,
+            m->source_count, site);
+    for (uint32_t k = 0; k < shown; k++)
+        fprintf(out, "%s%s (%s)", k > 0 ? ", " : "", names[k], examples[k]);
+    fprintf(out, "%s\n", has_more ? ", ..." : "");
+}
+
 void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
 {
     const mospt_metadata *m = &r->metadata;
@@ -77,6 +107,7 @@ void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
     if (dropped > 0) print_reasons(out, m);
     fprintf(out, "\n  scans      %" PRIu32 "%s\n", m->source_count,
             prep_build_left_something_out(r) ? ", and some input left out (see above)" : "");
+    print_other_crs(out, m);
     cli_bytes_text(r->payload_bytes, a);
     fprintf(out, "  tree       %" PRIu32 " nodes in %" PRIu32 " levels, %s (%.1f bytes a point)\n",
             r->node_count, r->level_count, a, (double)r->payload_bytes / (double)m->point_count);
@@ -115,6 +146,7 @@ static json_t *sources_json(const mospt_metadata *m)
             json_object_set_new(json, "bounds",
                                 json_pack("{s:o, s:o}", "min", cli_triple_json(s->low), "max",
                                           cli_triple_json(s->high)));
+        if (s->crs != NULL) json_object_set_new(json, "crs", cli_text_json(s->crs));
         if (s->damage != NULL) json_object_set_new(json, "damage", cli_text_json(s->damage));
         if (s->has_pose) {
             json_t *pose = json_array();
@@ -145,15 +177,15 @@ void cli_report_build_json(FILE *out, const char *output, const prep_build_resul
         json_object_set_new(seconds, prep_phase_name((prep_phase)p), json_real(r->seconds[p]));
     json_object_set_new(seconds, "total", json_real(r->total_seconds));
     cli_write_json(
-        out,
-        json_pack("{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
-                  "output", cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
-                  (json_int_t)points_dropped(m), "bounds", bounds_json(m), "sources",
-                  sources_json(m), "left_out", left_out, "unknown", unknown, "nodes",
-                  (json_int_t)r->node_count, "levels", (json_int_t)r->level_count, "bytes",
-                  (json_int_t)r->payload_bytes, "position_error", m->position_error, "step",
-                  m->grid.step, "peak_memory", (json_int_t)r->peak_memory, "scratch_bytes",
-                  (json_int_t)r->scratch_bytes, "seconds", seconds));
+        out, json_pack(
+                 "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
+                 "output", cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
+                 (json_int_t)points_dropped(m), "bounds", bounds_json(m), "crs",
+                 cli_text_json(m->crs), "sources", sources_json(m), "left_out", left_out, "unknown",
+                 unknown, "nodes", (json_int_t)r->node_count, "levels", (json_int_t)r->level_count,
+                 "bytes", (json_int_t)r->payload_bytes, "position_error", m->position_error, "step",
+                 m->grid.step, "peak_memory", (json_int_t)r->peak_memory, "scratch_bytes",
+                 (json_int_t)r->scratch_bytes, "seconds", seconds));
 }
 
 static void print_sources(FILE *out, const mospt_metadata *m)
@@ -203,6 +235,7 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
     fprintf(out, "  grid       step %.6g, root cube %.6g wide, largest position error %.3g\n",
             m->grid.step, m->grid.step * (double)(UINT64_C(1) << m->grid.bits), m->position_error);
     if (m->crs[0] != '\0') fprintf(out, "  crs        %s\n", m->crs);
+    print_other_crs(out, m);
     fprintf(out, "  attributes");
     for (uint32_t k = 0; k < m->schema.count; k++) {
         const mospt_attribute *at = &m->schema.at[k];

@@ -1,6 +1,8 @@
 #include "cli_words.h"
 
 #include <inttypes.h>
+#include <stdbool.h>
+#include <string.h>
 
 /* 12345678 as "12,345,678". */
 const char *cli_grouped(uint64_t n, char text[32])
@@ -42,6 +44,32 @@ void cli_write_json(FILE *out, json_t *json)
     json_dumpf(json, out, JSON_INDENT(2));
     fputc('\n', out);
     json_decref(json);
+}
+
+/* The authority that the whole of the WKT goes by; its parts have their own. */
+static bool find_authority(const char *wkt, char out[CLI_CRS_NAME_SIZE])
+{
+    char name[16], code[16];
+    int depth = 0;
+    bool is_quoted = false;
+    for (const char *p = wkt; *p != '\0'; p++) {
+        if (*p == '"') is_quoted = !is_quoted;
+        if (is_quoted) continue;
+        depth += (*p == '[') - (*p == ']');
+        if (depth != 1 || (*p != 'A' && *p != 'I')) continue;
+        if (sscanf(p, "AUTHORITY[\"%15[^\"]\",\"%15[^\"]\"", name, code) == 2 ||
+            sscanf(p, "ID[\"%15[^\"]\",%15[0-9]", name, code) == 2)
+            return snprintf(out, CLI_CRS_NAME_SIZE, "%s:%s", name, code) > 0;
+    }
+    return false;
+}
+
+void cli_crs_name(const char *crs, char out[CLI_CRS_NAME_SIZE])
+{
+    const char *quote = strchr(crs, '"');
+    if (strchr(crs, '[') == NULL || quote == NULL) snprintf(out, CLI_CRS_NAME_SIZE, "%s", crs);
+    else if (!find_authority(crs, out))
+        snprintf(out, CLI_CRS_NAME_SIZE, "%.*s", (int)strcspn(quote + 1, "\""), quote + 1);
 }
 
 void cli_print_triple(FILE *out, const double v[3])

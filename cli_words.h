@@ -10,6 +10,12 @@ const char *cli_grouped(uint64_t n, char text[32]);
 /* 12345678 as "12.3 MB". */
 void cli_bytes_text(uint64_t bytes, char text[32]);
 
+enum { CLI_CRS_NAME_SIZE = 80 };
+
+/* What to call a coordinate reference system: of WKT its code, "EPSG:25832", else its name; other
+ * text as it is, as far as it fits. */
+void cli_crs_name(const char *crs, char out[CLI_CRS_NAME_SIZE]);
+
 void cli_print_triple(FILE *out, const double v[3]);
 
 /* Text that may not be UTF-8. */

@@ -71,6 +71,8 @@ static prep_build_options build_options(const cli_options *o, const char *output
         .output = output,
         .temp_dir = o->temp_dir,
         .force = o->force,
+        .dedupe = o->dedupe,
+        .attributes = o->attributes,
         .threads = o->threads,
         .memory = o->memory,
         .inner_depth = o->inner_depth,
@@ -173,6 +175,21 @@ static bool is_dataset_name(const char *path)
     return mospt_dataset_exists(path) || (n > 5 && strncmp(path + n - 5, ".ipts", 5) == 0);
 }
 
+static bool inspect_scans(const cli_options *o, const prep_scan_options *options,
+                          prep_inspection **scans, uint32_t *count, mospt_err *err)
+{
+    *count = 1;
+    for (uint32_t i = 0; i < *count; i++) {
+        if (!prep_inspect(o->paths[0], i, options, o->stats, &(*scans)[i], err)) return false;
+        if (i > 0 || (*scans)[0].info.scan_count <= 1) continue;
+        *count = (*scans)[0].info.scan_count;
+        prep_inspection *all = realloc(*scans, *count * sizeof *all);
+        if (all == NULL) return mospt_err_nomem(err, *count * sizeof *all);
+        *scans = all;
+    }
+    return true;
+}
+
 static int info_of_scans(const cli_options *o)
 {
     mospt_err err = {0};
@@ -181,22 +198,16 @@ static int info_of_scans(const cli_options *o)
     prep_inspection *scans = malloc(sizeof *scans);
     uint32_t count = 1;
     bool ok = read_scan_options(o, &poses, &options, &err) &&
+              prep_scan_memory_create(&options.memory, &err) &&
               (scans != NULL || mospt_err_nomem(&err, sizeof *scans)) &&
-              prep_inspect(o->paths[0], 0, &options, o->stats, &scans[0], &err);
-    if (ok && scans[0].info.scan_count > 1) {
-        count = scans[0].info.scan_count;
-        prep_inspection *all = realloc(scans, count * sizeof *scans);
-        ok = all != NULL || mospt_err_nomem(&err, count * sizeof *scans);
-        if (ok) scans = all;
-        for (uint32_t i = 1; ok && i < count; i++)
-            ok = prep_inspect(o->paths[0], i, &options, o->stats, &scans[i], &err);
-    }
+              inspect_scans(o, &options, &scans, &count, &err);
     bool damaged = false;
     for (uint32_t i = 0; ok && i < count; i++)
         damaged = damaged || scans[i].damage.code != MOSPT_OK;
     if (ok && o->json) cli_report_scans_json(stdout, o->paths[0], scans, count);
     else if (ok) cli_report_scans(stdout, o->paths[0], scans, count);
     free(scans);
+    prep_scan_memory_destroy(options.memory);
     prep_pose_list_fini(&poses);
     return !ok ? fail(&err) : damaged ? EXIT_LEFT_OUT : EXIT_DONE;
 }

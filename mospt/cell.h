@@ -38,6 +38,17 @@ static inline uint64_t mospt_morton_spread(uint64_t v)
     return v;
 }
 
+/* The same for the lower 10 bits. */
+static inline uint32_t mospt_morton_spread_short(uint32_t v)
+{
+    v &= 0x3ff;
+    v = (v | v << 16) & 0x030000ff;
+    v = (v | v << 8) & 0x0300f00f;
+    v = (v | v << 4) & 0x030c30c3;
+    v = (v | v << 2) & 0x09249249;
+    return v;
+}
+
 /* Morton code of the first `depth` (at most 21) levels below a node that is 2^cell_bits steps wide.
  * The point must lie in the node: of its coordinates only the lower cell_bits are looked at. Below
  * the grid's resolution the code ends in zeros. */
@@ -54,6 +65,17 @@ static inline uint64_t mospt_cell_code(uint32_t x, uint32_t y, uint32_t z, uint3
         lx <<= pad, ly <<= pad, lz <<= pad;
     }
     return mospt_morton_spread(lx) | mospt_morton_spread(ly) << 1 | mospt_morton_spread(lz) << 2;
+}
+
+/* The same for at most 10 levels. */
+static inline uint32_t mospt_cell_code_short(uint32_t x, uint32_t y, uint32_t z, uint32_t cell_bits,
+                                             uint32_t depth)
+{
+    uint32_t drop = cell_bits > depth ? cell_bits - depth : 0,
+             pad = depth > cell_bits ? depth - cell_bits : 0, mask = (1u << depth) - 1;
+    return mospt_morton_spread_short((x >> drop << pad) & mask) |
+           mospt_morton_spread_short((y >> drop << pad) & mask) << 1 |
+           mospt_morton_spread_short((z >> drop << pad) & mask) << 2;
 }
 
 /* True if a point lies in the node at `level` whose low corner is `corner`. */

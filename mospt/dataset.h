@@ -12,6 +12,7 @@ typedef struct {
     char *name;           /* owned, relative to the folder that was built from */
     char *scan;           /* owned, name of the scan inside a file that holds several, else "" */
     char *format;         /* owned, for people */
+    char *crs;            /* owned; NULL: that of the dataset, or the scan says nothing */
     uint64_t points;      /* in the dataset */
     uint64_t dropped;     /* the sum of the reasons */
     char *drop_reason[8]; /* [reason_count], owned */

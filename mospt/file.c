@@ -69,6 +69,15 @@ bool mospt_file_write_at(int fd, const char *path, uint64_t offset, const void *
     return true;
 }
 
+void mospt_file_start_flush(int fd, uint64_t offset, uint64_t size)
+{
+#ifdef __linux__
+    (void)!sync_file_range(fd, (off_t)offset, (off_t)size, SYNC_FILE_RANGE_WRITE);
+#else
+    (void)fd, (void)offset, (void)size;
+#endif
+}
+
 bool mospt_file_read_whole(const char *path, size_t max_size, char **out, size_t *size,
                            mospt_err *err)
 {

@@ -2,88 +2,162 @@
 
 #include <stdlib.h>
 
+enum { FEW = 16 }; /* points in one cell, for a plain sort */
+
+/* The points that stand for the cells of the present depth. */
+typedef struct {
+    uint32_t *place; /* of the point in the keys */
+    uint32_t *colour;
+    uint8_t *boundary; /* coarsest depth at which it is in another cell than the one before it */
+} standing;
+
 size_t mospt_linear_work_size(uint32_t count)
 {
-    return (size_t)count * (sizeof(uint32_t) + 1);
+    return (size_t)count * (2 * sizeof(uint32_t) + 2);
 }
 
-static uint64_t cell_of(const mospt_linear_input *in, const mospt_linear_key *key)
+static const uint8_t *record_of(const mospt_linear_input *in, uint64_t key)
 {
-    return key->code >> in->code_shift;
+    return mospt_records_at(in->records, mospt_linear_index(key, in->index_bits));
 }
 
-static const uint8_t *record_of(const mospt_linear_input *in, const mospt_linear_key *key)
-{
-    return in->records + (size_t)key->index * in->stride;
-}
-
+/* By their bytes. Most differ in the first one. */
 static int compare_records(const void *a, const void *b, void *user)
 {
     const mospt_linear_input *in = user;
-    return memcmp(record_of(in, a), record_of(in, b), in->stride);
+    const uint8_t *x = record_of(in, *(const uint64_t *)a),
+                  *y = record_of(in, *(const uint64_t *)b);
+    return x[0] != y[0] ? x[0] - y[0] : memcmp(x, y, in->records->stride);
+}
+
+static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count)
+{
+    if (count > FEW) {
+        qsort_r(keys, count, sizeof *keys, compare_records, (void *)(uintptr_t)in);
+        return;
+    }
+    for (uint32_t i = 1; i < count; i++) {
+        uint64_t key = keys[i];
+        uint32_t at = i;
+        for (; at > 0 && compare_records(&keys[at - 1], &key, (void *)(uintptr_t)in) > 0; at--)
+            keys[at] = keys[at - 1];
+        keys[at] = key;
+    }
 }
 
 /* The order in which points arrived must not show in the result: only their bytes order the points
  * of one cell. */
-static void sort_shared_cells(const mospt_linear_input *in, mospt_linear_key *keys, uint32_t count)
+static void sort_shared_cells(const mospt_linear_input *in, uint64_t *keys, uint32_t count)
 {
     for (uint32_t a = 0, b; a < count; a = b) {
-        uint64_t cell = cell_of(in, &keys[a]);
-        for (b = a + 1; b < count && cell_of(in, &keys[b]) == cell;)
+        uint64_t cell = keys[a] >> in->cell_shift;
+        for (b = a + 1; b < count && keys[b] >> in->cell_shift == cell;)
             b++;
-        if (b - a > 1)
-            qsort_r(keys + a, b - a, sizeof *keys, compare_records, (void *)(uintptr_t)in);
+        if (b - a > 1) sort_cell(in, keys + a, b - a);
     }
+}
+
+/* Depth at which two cells of the finest depth part: 0 for other octants of the node, `depth` + 1
+ * for the same cell. */
+static uint8_t parting_depth(uint64_t a, uint64_t b, uint32_t depth)
+{
+    uint64_t differ = a ^ b;
+    if (differ == 0) return (uint8_t)(depth + 1);
+    return (uint8_t)(depth - (63 - (uint32_t)__builtin_clzll(differ)) / 3);
+}
+
+static void stand_all(const mospt_linear_input *in, const uint64_t *keys, uint32_t count,
+                      standing *s)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        s->place[i] = i;
+        s->colour[i] = in->colours[mospt_linear_index(keys[i], in->index_bits)];
+        s->boundary[i] = i == 0 ? 0
+                                : parting_depth(keys[i] >> in->cell_shift,
+                                                keys[i - 1] >> in->cell_shift, in->depth);
+    }
+}
+
+static int32_t channel(uint32_t colour, int c)
+{
+    uint8_t bytes[4];
+    memcpy(bytes, &colour, sizeof bytes);
+    return bytes[c];
 }
 
 /* Section 4.6: of the points standing for the children of a cell, the one whose colour is nearest
  * to their average; the first of several. Distances are compared as |n c - sum|^2, in integers, so
  * that every machine decides alike. */
-static uint32_t choose(const mospt_linear_input *in, const mospt_linear_key *keys,
-                       const uint32_t *from, uint32_t n)
+static uint32_t choose(const uint32_t *colours, uint32_t n)
 {
-    int64_t sum[3] = {0};
-    if (n == 1) return from[0];
+    int64_t sum[3] = {0}, best_distance = INT64_MAX;
+    uint32_t best = 0;
+    for (uint32_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += channel(colours[i], c);
     for (uint32_t i = 0; i < n; i++) {
-        mospt_vertex v = mospt_vertex_of(record_of(in, &keys[from[i]]));
-        sum[0] += v.r, sum[1] += v.g, sum[2] += v.b;
-    }
-    uint32_t best = from[0];
-    int64_t best_distance = INT64_MAX;
-    for (uint32_t i = 0; i < n; i++) {
-        mospt_vertex v = mospt_vertex_of(record_of(in, &keys[from[i]]));
-        int64_t dr = (int64_t)n * v.r - sum[0], dg = (int64_t)n * v.g - sum[1],
-                db = (int64_t)n * v.b - sum[2];
-        int64_t distance = dr * dr + dg * dg + db * db;
-        if (distance < best_distance) best_distance = distance, best = from[i];
+        int64_t distance = 0;
+        for (int c = 0; c < 3; c++) {
+            int64_t d = (int64_t)n * channel(colours[i], c) - sum[c];
+            distance += d * d;
+        }
+        if (distance < best_distance) best_distance = distance, best = i;
     }
     return best;
 }
 
-void mospt_linear_build(const mospt_linear_input *in, mospt_linear_key *keys, uint32_t count,
-                        void *work, uint32_t *order, uint32_t *level_end)
+/* The same for the up to eight children of an inner cell, where 32 bits do. */
+static uint32_t choose_child(const uint32_t *colours, uint32_t n)
 {
-    uint32_t *standing =
-        work; /* positions in keys of the points that stand for the cells of the present depth */
-    uint8_t *level = (uint8_t *)(standing + count);
-    uint32_t standing_count = count;
-    uint32_t at[MOSPT_LEVELS_MAX] = {0};
+    int32_t sum[3] = {0}, best_distance = INT32_MAX, count = (int32_t)n;
+    uint32_t best = 0;
+    for (uint32_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += channel(colours[i], c);
+    for (uint32_t i = 0; i < n; i++) {
+        int32_t dr = count * channel(colours[i], 0) - sum[0],
+                dg = count * channel(colours[i], 1) - sum[1],
+                db = count * channel(colours[i], 2) - sum[2];
+        int32_t distance = dr * dr + dg * dg + db * db;
+        if (distance < best_distance) best_distance = distance, best = i;
+    }
+    return best;
+}
+
+/* Leaves one of the points in each cell of `depth` standing, and gives them that level. Returns how
+ * many. */
+static uint32_t rise(standing *s, uint32_t count, uint32_t depth, uint8_t *level)
+{
+    uint32_t out = 0;
+    for (uint32_t a = 0, b; a < count; a = b) {
+        for (b = a + 1; b < count && s->boundary[b] > depth;)
+            b++;
+        uint32_t chosen = a;
+        if (b - a > 1 && b - a <= MOSPT_CHILDREN_MAX) chosen += choose_child(s->colour + a, b - a);
+        else if (b - a > 1) chosen += choose(s->colour + a, b - a);
+        level[s->place[chosen]] = (uint8_t)depth;
+        s->place[out] = s->place[chosen];
+        s->colour[out] = s->colour[chosen];
+        s->boundary[out++] = s->boundary[a];
+    }
+    return out;
+}
+
+void mospt_linear_build(const mospt_linear_input *in, uint64_t *keys, uint32_t count, void *work,
+                        uint32_t *order, uint32_t *level_end)
+{
+    standing s = {.place = work};
+    s.colour = s.place + count;
+    s.boundary = (uint8_t *)(s.colour + count);
+    uint8_t *level = s.boundary + count;
+    uint32_t at[MOSPT_LEVELS_MAX] = {0}, standing_count = count;
 
     sort_shared_cells(in, keys, count);
-    for (uint32_t i = 0; i < count; i++)
-        standing[i] = i, level[i] = (uint8_t)(in->depth + 1);
-    for (uint32_t depth = in->depth + 1; depth-- > 0;) {
-        uint32_t shift = in->code_shift + 3 * (in->depth - depth), out = 0;
-        for (uint32_t a = 0, b; a < standing_count; a = b) {
-            uint64_t cell = keys[standing[a]].code >> shift;
-            for (b = a + 1; b < standing_count && keys[standing[b]].code >> shift == cell;)
-                b++;
-            uint32_t chosen = choose(in, keys, standing + a, b - a);
-            level[chosen] = (uint8_t)depth;
-            standing[out++] = chosen;
-        }
-        standing_count = out;
-    }
+    stand_all(in, keys, count, &s);
+    memset(level, (int)in->depth + 1, count);
+    for (uint32_t depth = in->depth + 1; depth-- > 0;)
+        standing_count = rise(&s, standing_count, depth, level);
+
     for (uint32_t i = 0; i < count; i++)
         at[level[i]]++;
     for (uint32_t l = 0, end = 0; l < in->depth + 2; l++) {
@@ -92,5 +166,5 @@ void mospt_linear_build(const mospt_linear_input *in, mospt_linear_key *keys, ui
         level_end[l] = end += here;
     }
     for (uint32_t i = 0; i < count; i++)
-        order[at[level[i]]++] = keys[i].index;
+        order[at[level[i]]++] = mospt_linear_index(keys[i], in->index_bits);
 }

@@ -9,31 +9,34 @@
 #include "mospt/hierarchy.h"
 #include "mospt/point.h"
 
-/* A point in the Morton order of its node. */
+/* A key is a point in the Morton order of its node: the cell in its upper bits, the index of its
+ * record in the lower `index_bits`. */
 typedef struct {
-    uint64_t code;  /* mospt_cell_code() of at least `depth` levels */
-    uint32_t index; /* of its record */
-} mospt_linear_key;
-
-typedef struct {
-    const uint8_t *records; /* [..][stride], borrowed; each starts with a vertex, and all of it
-                               orders points in one cell */
-    size_t stride;
-    uint32_t depth;      /* of the inner octree, MOSPT_DEPTH_MIN to MOSPT_DEPTH_MAX */
-    uint32_t code_shift; /* bits of the codes below that depth: the cell of a key is code >>
-                            code_shift */
+    const mospt_records *records; /* borrowed; all of a record orders points in one cell */
+    const uint32_t *colours; /* borrowed, one per record: r, g, b, i of its vertex as they stand
+                                in memory */
+    uint32_t depth;          /* of the inner octree, MOSPT_DEPTH_MIN to MOSPT_DEPTH_MAX */
+    uint32_t index_bits;     /* 0 to 32 */
+    uint32_t cell_shift; /* bits of a key below that depth, the index included: the cell of a key is
+                            key >> cell_shift */
 } mospt_linear_input;
+
+static inline uint32_t mospt_linear_index(uint64_t key, uint32_t index_bits)
+{
+    return (uint32_t)(key & ((UINT64_C(1) << index_bits) - 1));
+}
 
 /* Bytes of working memory that mospt_linear_build() needs for `count` points. */
 size_t mospt_linear_work_size(uint32_t count);
 
 /* Puts the points of one node in the order of a MOSPT.
  * keys       [count], by rising cell; those in one cell may come in any order, and are put into the
- * one that their bytes give work       mospt_linear_work_size(count) bytes, aligned for any type
+ *            one that their bytes give
+ * work       mospt_linear_work_size(count) bytes, aligned for any type
  * order      out, [count] record indices, coarsest level first, Morton order within a level
  * level_end  out, [depth + 2] */
-void mospt_linear_build(const mospt_linear_input *input, mospt_linear_key *keys, uint32_t count,
-                        void *work, uint32_t *order, uint32_t *level_end);
+void mospt_linear_build(const mospt_linear_input *input, uint64_t *keys, uint32_t count, void *work,
+                        uint32_t *order, uint32_t *level_end);
 
 /* Number of leading points to draw so that cells of the level drawn are at most `max_px` wide on
  * screen, or all. root_px  projected width of the node's cube, pixels; each level halves it */

@@ -16,7 +16,7 @@ void mospt_metadata_fini(mospt_metadata *m)
 {
     for (uint32_t i = 0; i < m->source_count; i++) {
         mospt_source *s = &m->sources[i];
-        free(s->name), free(s->scan), free(s->format), free(s->damage);
+        free(s->name), free(s->scan), free(s->format), free(s->crs), free(s->damage);
         for (uint32_t r = 0; r < s->reason_count; r++)
             free(s->drop_reason[r]);
     }
@@ -88,6 +88,7 @@ static json_t *source_to_json(const mospt_source *s)
         json_object_set_new(json, "min", reals_to_json(s->low, 3));
         json_object_set_new(json, "max", reals_to_json(s->high, 3));
     }
+    if (s->crs != NULL) json_object_set_new(json, "crs", text_to_json(s->crs));
     if (s->damage != NULL) json_object_set_new(json, "damage", text_to_json(s->damage));
     if (s->has_pose) json_object_set_new(json, "pose", reals_to_json(s->pose, 16));
     return json;
@@ -270,6 +271,7 @@ static void source_from_json(parse *p, json_t *json, mospt_source *s)
         s->drop_count[s->reason_count++] = (uint64_t)json_integer_value(value);
         s->dropped += (uint64_t)json_integer_value(value);
     }
+    if (json_object_get(json, "crs") != NULL) s->crs = get_text(p, json, "crs");
     if (json_object_get(json, "damage") != NULL) s->damage = get_text(p, json, "damage");
     if (json_object_get(json, "pose") != NULL) {
         get_reals(p, json, "pose", s->pose, 16);

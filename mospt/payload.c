@@ -5,59 +5,81 @@
 /* Points whose records are packed plane by plane while they are still in the first cache. */
 enum { BLOCK = 256 };
 
+/* Calls `copy` with a size that is a constant for the usual ones, so that each copy is a load and a
+ * store. */
+#define WITH_CONSTANT_SIZE(size, copy)                                                             \
+    switch (size) {                                                                                \
+    case 1:                                                                                        \
+        copy(1);                                                                                   \
+        break;                                                                                     \
+    case 2:                                                                                        \
+        copy(2);                                                                                   \
+        break;                                                                                     \
+    case 4:                                                                                        \
+        copy(4);                                                                                   \
+        break;                                                                                     \
+    case 6:                                                                                        \
+        copy(6);                                                                                   \
+        break;                                                                                     \
+    case 8:                                                                                        \
+        copy(8);                                                                                   \
+        break;                                                                                     \
+    case 12:                                                                                       \
+        copy(12);                                                                                  \
+        break;                                                                                     \
+    case 16:                                                                                       \
+        copy(16);                                                                                  \
+        break;                                                                                     \
+    default:                                                                                       \
+        copy(size);                                                                                \
+        break;                                                                                     \
+    }
+
 static void copy_strided(uint8_t *to, size_t to_stride, const uint8_t *from, size_t from_stride,
                          size_t size, uint32_t count)
 {
-    switch (size) { /* a constant size makes each copy one load and one store */
-    case 1:
-        for (uint32_t i = 0; i < count; i++)
-            to[i * to_stride] = from[i * from_stride];
-        return;
-    case 2:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(to + i * to_stride, from + i * from_stride, 2);
-        return;
-    case 4:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(to + i * to_stride, from + i * from_stride, 4);
-        return;
-    case 8:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(to + i * to_stride, from + i * from_stride, 8);
-        return;
-    case 16:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(to + i * to_stride, from + i * from_stride, 16);
-        return;
-    default:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(to + i * to_stride, from + i * from_stride, size);
-    }
+#define COPY(size)                                                                                 \
+    for (uint32_t i = 0; i < count; i++)                                                           \
+    memcpy(to + i * to_stride, from + i * from_stride, size)
+    WITH_CONSTANT_SIZE(size, COPY)
+#undef COPY
 }
 
-void mospt_payload_pack(const mospt_schema *schema, const uint8_t *records, const uint32_t *order,
-                        uint32_t count, uint8_t *out, mospt_node *node)
+/* from     [count] records; what is copied stands at `offset` in each of them */
+static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_t size,
+                   uint32_t count)
 {
-    size_t stride = mospt_record_size(schema), vertices_size = (size_t)count * sizeof(mospt_vertex);
+#define COPY(size)                                                                                 \
+    for (uint32_t i = 0; i < count; i++)                                                           \
+    memcpy(to + i * (size), from[i] + offset, size)
+    WITH_CONSTANT_SIZE(size, COPY)
+#undef COPY
+}
+
+void mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
+                        const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node)
+{
+    size_t vertices_size = (size_t)count * sizeof(mospt_vertex);
     uint8_t *planes = out + vertices_size;
+    const uint8_t *from[BLOCK];
     for (uint32_t start = 0; start < count; start += BLOCK) {
         uint32_t n = count - start < BLOCK ? count - start : BLOCK;
-        for (uint32_t i = start; i < start + n; i++)
-            memcpy(out + (size_t)i * sizeof(mospt_vertex), records + order[i] * stride,
-                   sizeof(mospt_vertex));
+        for (uint32_t i = 0; i < n; i++) {
+            from[i] = mospt_records_at(records, order[start + i]);
+            __builtin_prefetch(from[i]); /* they lie anywhere in memory */
+            __builtin_prefetch(from[i] + records->stride - 1);
+        }
+        gather(out + start * sizeof(mospt_vertex), from, 0, sizeof(mospt_vertex), n);
         for (uint32_t k = 0; k < schema->count; k++) {
             const mospt_attribute *a = &schema->at[k];
             size_t size = mospt_attribute_size(a);
-            uint8_t *plane = planes + (size_t)count * a->offset;
-            const uint8_t *from = records + sizeof(mospt_vertex) + a->offset;
-            for (uint32_t i = start; i < start + n;
-                 i++) /* gathers: the stride of `from` is no constant */
-                copy_strided(plane + i * size, size, from + order[i] * stride, stride, size, 1);
+            gather(planes + (size_t)count * a->offset + start * size, from,
+                   sizeof(mospt_vertex) + a->offset, size, n);
         }
     }
     node->count = count;
     node->codec = MOSPT_CODEC_RAW;
-    node->payload_size = (uint64_t)count * stride;
+    node->payload_size = (uint64_t)count * mospt_record_size(schema);
     node->vertices_hash = mospt_hash(out, vertices_size);
     node->attributes_hash = mospt_hash(planes, (size_t)count * schema->row_size);
 }

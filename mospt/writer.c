@@ -109,8 +109,7 @@ static bool add_file(mospt_writer *w, mospt_err *err)
     return fd >= 0;
 }
 
-bool mospt_writer_append(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
-                         mospt_err *err)
+bool mospt_writer_place(mospt_writer *w, mospt_node *node, uint32_t *index, mospt_err *err)
 {
     uint32_t file = node->level < FILES_MAX ? node->level : FILES_MAX - 1;
     while (w->file_count <= file)
@@ -122,15 +121,28 @@ bool mospt_writer_append(mospt_writer *w, const mospt_node *node, const uint8_t 
         w->hierarchy.nodes = nodes;
         w->capacity = capacity;
     }
-    if (!mospt_file_write_at(w->fd[file], w->path, w->size[file], payload,
-                             (size_t)node->payload_size, err))
-        return false;
-    mospt_node *copy = &w->hierarchy.nodes[w->hierarchy.count++];
-    *copy = *node;
-    copy->payload_file = (uint16_t)file;
-    copy->payload_offset = w->size[file];
+    node->payload_file = (uint16_t)file;
+    node->payload_offset = w->size[file];
     w->size[file] += node->payload_size;
     w->bytes += node->payload_size;
+    *index = w->hierarchy.count++;
+    w->hierarchy.nodes[*index] = *node;
+    return true;
+}
+
+void mospt_writer_complete(mospt_writer *w, uint32_t index, const mospt_node *node)
+{
+    w->hierarchy.nodes[index] = *node;
+}
+
+bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
+                        mospt_err *err)
+{
+    int fd = w->fd[node->payload_file];
+    if (!mospt_file_write_at(fd, w->path, node->payload_offset, payload, (size_t)node->payload_size,
+                             err))
+        return false;
+    mospt_file_start_flush(fd, node->payload_offset, node->payload_size);
     return true;
 }
 

@@ -13,11 +13,20 @@ typedef struct mospt_writer mospt_writer;
 bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **out,
                          mospt_err *err);
 
-/* Appends the payload of a node; place and index of its file are set in the writer's copy.
- * node     corner, level, child_mask, level_end, and what mospt_payload_pack() sets
+/* Gives a node its place, in the order in which nodes come.
+ * node     corner, level, child_mask, count and payload_size; out: place and index of its file
+ * index    out, of the node in the writer
  * threads  one at a time */
-bool mospt_writer_append(mospt_writer *writer, const mospt_node *node, const uint8_t *payload,
-                         mospt_err *err);
+bool mospt_writer_place(mospt_writer *writer, mospt_node *node, uint32_t *index, mospt_err *err);
+
+/* Writes the payload of a node that has its place.
+ * threads  any, also while others get their places */
+bool mospt_writer_write(mospt_writer *writer, const mospt_node *node, const uint8_t *payload,
+                        mospt_err *err);
+
+/* Says the rest of a node: level_end, and what mospt_payload_pack() sets.
+ * threads  one at a time, also with mospt_writer_place() */
+void mospt_writer_complete(mospt_writer *writer, uint32_t index, const mospt_node *node);
 
 /* Bytes of payload so far, and nodes. */
 uint64_t mospt_writer_bytes(const mospt_writer *writer);

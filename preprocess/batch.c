@@ -51,3 +51,11 @@ void prep_batch_compact(prep_batch *batch, const uint8_t *keep)
     }
     batch->count = out;
 }
+
+bool prep_batch_suits(const prep_batch *batch, const mospt_schema *schema)
+{
+    if (batch->plane_count != schema->count) return false;
+    for (uint32_t k = 0; k < schema->count; k++)
+        if (batch->plane_size[k] != mospt_attribute_size(&schema->at[k])) return false;
+    return true;
+}

@@ -20,5 +20,8 @@ bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t cap
                      mospt_err *err);
 void prep_batch_fini(prep_batch *batch);
 
+/* True if points with these attributes fit the planes of the batch. */
+bool prep_batch_suits(const prep_batch *batch, const mospt_schema *schema);
+
 /* Removes the points for which keep[i] is 0, in place; the others keep their order. */
 void prep_batch_compact(prep_batch *batch, const uint8_t *keep);

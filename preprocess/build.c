@@ -1,8 +1,9 @@
 #include "preprocess/build.h"
 
 #include "mospt/file.h"
-#include "preprocess/pack.h"
-#include "preprocess/pass.h"
+#include "preprocess/dedupe.h"
+#include "preprocess/feed.h"
+#include "preprocess/finish.h"
 #include "preprocess/plan.h"
 
 #include <fcntl.h>
@@ -15,7 +16,6 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { PACK_SLICE = 8192 };
 /* What a dataset is called that will take another one's place. */
 static const char BESIDE[] = ".building";
 
@@ -27,6 +27,7 @@ typedef struct {
     prep_shape shape;
     mospt_metadata *metadata; /* of the result */
     prep_store *store;
+    prep_arena *arena;
     mospt_writer *writer;
     prep_written written;
     prep_phase phase;
@@ -124,23 +125,63 @@ static bool choose_folders(build *b, mospt_err *err)
     return true;
 }
 
+/* True if a list of names, separated by commas, has this one. */
+static bool list_has(const char *list, const char *name)
+{
+    size_t length = strlen(name);
+    for (const char *at = list; at != NULL; at = strchr(at, ',')) {
+        at += *at == ',';
+        if (strncmp(at, name, length) == 0 && (at[length] == ',' || at[length] == '\0'))
+            return true;
+    }
+    return false;
+}
+
+static bool some_scan_has(const prep_source *source, const char *name)
+{
+    for (uint32_t i = 0; i < source->scan_count; i++)
+        if (mospt_schema_find(&source->scans[i].info.attributes, name) >= 0) return true;
+    return false;
+}
+
+/* A name that is in the list and in no scan is a slip of the pen. */
+static bool check_wanted(const build *b, mospt_err *err)
+{
+    const char *at = b->options->attributes;
+    while (at != NULL && strcmp(at, "none") != 0) {
+        char name[MOSPT_ATTRIBUTE_NAME_MAX];
+        size_t length = strcspn(at, ",");
+        snprintf(name, sizeof name, "%.*s", (int)length, at);
+        if (strcmp(name, "scan") != 0 && !some_scan_has(&b->result->source, name))
+            return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                                 "no scan has an attribute \"%.*s\"; `instantpoints info SCAN` "
+                                 "lists those that there are",
+                                 (int)length, at);
+        at = at[length] == ',' ? at + length + 1 : NULL;
+    }
+    return true;
+}
+
 static bool make_schema(build *b, mospt_err *err)
 {
+    const char *wanted = b->options->attributes;
     mospt_schema *schema = &b->metadata->schema;
     const prep_source *source = &b->result->source;
     *schema = (mospt_schema){0};
+    if (!check_wanted(b, err)) return false;
     if (!mospt_schema_add(schema, "scan", source->scan_count > UINT16_MAX ? MOSPT_U32 : MOSPT_U16,
                           1, err))
         return false;
     for (uint32_t i = 0; i < source->scan_count; i++) {
         const mospt_schema *planes = &source->scans[i].info.attributes;
-        for (uint32_t k = 0; k < planes->count; k++)
-            if (!mospt_schema_add(schema, planes->at[k].name, planes->at[k].type,
-                                  planes->at[k].components, err)) {
-                if (err != NULL && err->file[0] == '\0')
-                    snprintf(err->file, sizeof err->file, "%s", source->scans[i].path);
-                return false;
-            }
+        for (uint32_t k = 0; k < planes->count; k++) {
+            const mospt_attribute *a = &planes->at[k];
+            if (wanted != NULL && !list_has(wanted, a->name)) continue;
+            if (mospt_schema_add(schema, a->name, a->type, a->components, err)) continue;
+            if (err != NULL && err->file[0] == '\0')
+                snprintf(err->file, sizeof err->file, "%s", source->scans[i].path);
+            return false;
+        }
     }
     return true;
 }
@@ -205,73 +246,59 @@ static bool check_disks(build *b, mospt_err *err)
     return ok;
 }
 
+/* A batch of a scan on its way into the first pass. */
 typedef struct {
     const prep_batch *batch;
     prep_packer packer;
-    uint8_t *records;
     prep_pack_sums *sums; /* [slices] */
-} pack_job;
+} packing;
 
-static void pack_slice(void *context, uint32_t slice)
+static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
 {
-    pack_job *job = context;
-    uint32_t begin = slice * PACK_SLICE, end = begin + PACK_SLICE;
-    job->sums[slice] = prep_pack_sums_empty;
-    prep_pack(&job->packer, job->batch, begin, end < job->batch->count ? end : job->batch->count,
-              job->records, &job->sums[slice]);
+    packing *p = context;
+    uint32_t begin = slice * PREP_PASS_SLICE, left = p->batch->count - begin;
+    uint32_t count = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
+    p->sums[slice] = prep_pack_sums_empty;
+    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice]);
+    return p->sums[slice].outside ? 0 : count;
 }
 
-/* Packs a batch with all workers. */
-static prep_pack_sums pack_batch(build *b, const prep_batch *batch, uint32_t scan, uint8_t *records,
-                                 prep_pack_sums *slice_sums)
+static uint32_t slices_of(uint32_t count)
 {
-    prep_pack_sums sums = prep_pack_sums_empty;
-    uint32_t slices = (batch->count + PACK_SLICE - 1) / PACK_SLICE;
-    pack_job job = {.batch = batch,
-                    .records = records,
-                    .sums = slice_sums,
-                    .packer = {.grid = &b->metadata->grid,
-                               .schema = &b->metadata->schema,
-                               .planes = &b->result->source.scans[scan].info.attributes,
-                               .scan = scan}};
-    prep_workers_run(b->workers, slices, pack_slice, &job);
-    for (uint32_t i = 0; i < slices; i++)
-        prep_pack_sums_add(&sums, &slice_sums[i]);
-    return sums;
+    return (count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE;
 }
 
 /* Streams all scans through the first pass.
  * outside  out: a point was outside the root cube, which header bounds have promised not to happen;
- * start again */
-static bool stream_points(build *b, prep_pass *pass, prep_pack_sums *of_scan, bool *outside,
-                          mospt_err *err)
+ *          start again */
+static bool stream_points(build *b, prep_pass *pass, uint32_t batch_slices, prep_pack_sums *of_scan,
+                          bool *outside, mospt_err *err)
 {
     prep_source *source = &b->result->source;
-    uint32_t room =
-        b->plan.batch_count > PREP_BATCH_CAPACITY ? b->plan.batch_count : PREP_BATCH_CAPACITY;
     prep_stream *stream = NULL;
-    uint8_t *records = malloc(room * mospt_record_size(&b->metadata->schema));
-    prep_pack_sums *sums = malloc((room / PACK_SLICE + 1) * sizeof *sums);
     uint64_t points = 0;
-    bool ok = records != NULL && sums != NULL;
-    if (!ok) mospt_err_nomem(err, room * mospt_record_size(&b->metadata->schema));
-    ok = ok && prep_stream_open(source, b->plan.batch_count, &stream, err);
+    packing p = {.packer = {.grid = &b->metadata->grid, .schema = &b->metadata->schema},
+                 .sums = malloc(batch_slices * sizeof *p.sums)};
+    bool ok = p.sums != NULL || mospt_err_nomem(err, batch_slices * sizeof *p.sums);
+    ok = ok && prep_stream_open(source, batch_slices * PREP_PASS_SLICE, &stream, err);
     while (ok && !*outside) {
-        const prep_batch *batch;
         uint32_t scan = 0;
-        ok = prep_stream_next(stream, &batch, &scan, err);
-        if (!ok || batch == NULL) break;
-        prep_pack_sums packed = pack_batch(b, batch, scan, records, sums);
-        *outside = packed.outside;
-        if (packed.outside) break;
-        prep_pack_sums_add(&of_scan[scan], &packed);
-        points += batch->count;
-        ok = prep_pass_insert(pass, records, batch->count, err);
+        ok = prep_stream_next(stream, &p.batch, &scan, err);
+        if (!ok || p.batch == NULL) break;
+        p.packer.planes = &source->scans[scan].info.attributes;
+        p.packer.scan = scan;
+        uint32_t slices = slices_of(p.batch->count);
+        ok = prep_pass_insert(pass, slices, pack_slice, &p, err);
+        for (uint32_t i = 0; i < slices; i++) {
+            *outside = *outside || p.sums[i].outside;
+            prep_pack_sums_add(&of_scan[scan], &p.sums[i]);
+        }
+        points += p.batch->count;
         if (ok && !tell(b, points))
             ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     }
     prep_stream_close(stream);
-    free(records), free(sums);
+    free(p.sums);
     return ok;
 }
 
@@ -295,51 +322,93 @@ static bool measure(build *b, bool all, mospt_err *err)
     return true;
 }
 
-/* One try at the whole tree. `*outside` as for stream_points(). */
+/* Divides all points first, and starts the first pass again without duplicates.
+ * pass     in: dividing; out: the first pass; NULL after a failure */
+static bool drop_duplicates(build *b, prep_pass_env *env, prep_pass **pass, prep_pack_sums *of_scan,
+                            mospt_err *err)
+{
+    prep_source *source = &b->result->source;
+    prep_pass *divided = *pass;
+    prep_spool kept = {0};
+    prep_dedupe_scan *scans = calloc(source->scan_count, sizeof *scans);
+    *pass = NULL;
+    if (scans == NULL) {
+        prep_pass_abandon(divided);
+        return mospt_err_nomem(err, source->scan_count * sizeof *scans);
+    }
+    bool ok = prep_dedupe(env, divided, scans, source->scan_count, &kept, err);
+    for (uint32_t i = 0; ok && i < source->scan_count; i++) {
+        scans[i].sums.position_error = of_scan[i].position_error;
+        of_scan[i] = scans[i].sums;
+        source->scans[i].points -= scans[i].dropped;
+        source->scans[i].dropped[PREP_DROP_DUPLICATE] = scans[i].dropped;
+    }
+    free(scans);
+    env->divides = false;
+    ok = ok && prep_pass_begin(env, b->metadata->grid.root, 0, pass, err) &&
+         prep_feed_spool(env, *pass, &kept, err);
+    prep_spool_drop(b->store, &kept);
+    return ok;
+}
+
+/* Takes over the passes. `*outside` as for stream_points(). */
+static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, bool *outside,
+                       mospt_err *err)
+{
+    const prep_source *source = &b->result->source;
+    prep_pass *pass = NULL;
+    enter(b, PREP_PHASE_READ);
+    bool ok = prep_pass_begin(env, b->metadata->grid.root, 0, &pass, err) &&
+              stream_points(b, pass, env->batch_slices, of_scan, outside, err);
+    if (!ok || *outside) {
+        prep_pass_abandon(pass);
+        return ok;
+    }
+    enter(b, PREP_PHASE_WRITE);
+    if (env->divides && !drop_duplicates(b, env, &pass, of_scan, err)) {
+        prep_pass_abandon(pass);
+        return false;
+    }
+    b->points_total = 0;
+    for (uint32_t i = 0; i < source->scan_count; i++)
+        b->points_total += source->scans[i].points;
+    if (b->points_total > 0) return prep_pass_end(pass, err);
+    prep_pass_abandon(pass);
+    return mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point could be read");
+}
+
+/* One try at the whole tree. */
 static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_err *err)
 {
-    bool ok = false;
-    prep_pass *pass = NULL;
-    size_t record_size = mospt_record_size(&b->metadata->schema);
+    uint32_t spooled_slices = slices_of(PREP_BATCH_CAPACITY); /* of what text has said */
     b->shape = (prep_shape){.grid = &b->metadata->grid,
                             .schema = &b->metadata->schema,
                             .inner_depth = b->metadata->inner_depth,
                             .add_threshold = b->metadata->add_threshold};
-    if (!prep_store_create(b->scratch_folder, record_size, b->plan.block_size, b->plan.store_memory,
-                           &b->store, err))
-        return false;
+    bool ok = prep_store_create(b->scratch_folder, mospt_record_size(&b->metadata->schema),
+                                b->plan.block_size, b->plan.store_memory, &b->store, err) &&
+              prep_arena_create(b->plan.solve_memory, &b->arena, err);
     prep_pass_env env = {.shape = &b->shape,
                          .workers = b->workers,
                          .store = b->store,
+                         .arena = b->arena,
                          .writer = b->writer,
+                         .divides = b->options->dedupe,
                          .levels = b->plan.levels,
-                         .solve_memory = b->plan.solve_memory,
+                         .batch_slices = b->plan.batch_slices,
+                         .solve_points = b->plan.solve_points,
                          .written = &b->written,
-                         .batch_count = b->plan.batch_count > PREP_BATCH_CAPACITY
-                                            ? b->plan.batch_count
-                                            : PREP_BATCH_CAPACITY,
                          .report = tell_written,
                          .report_context = b};
-    enter(b, PREP_PHASE_READ);
-    ok = prep_pass_begin(&env, b->metadata->grid.root, 0, &pass, err) &&
-         stream_points(b, pass, of_scan, outside, err);
-    if (ok && !*outside) {
-        enter(b, PREP_PHASE_WRITE);
-        b->points_total = 0;
-        for (uint32_t i = 0; i < b->result->source.scan_count; i++)
-            b->points_total += b->result->source.scans[i].points;
-        if (b->points_total == 0) {
-            prep_pass_abandon(pass);
-            ok = mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point could be read");
-        } else {
-            ok = prep_pass_end(pass, err);
-        }
-    } else {
-        prep_pass_abandon(pass);
-    }
-    b->result->scratch_bytes = prep_store_scratch_peak(b->store) + b->result->source.spool_size;
+    if (b->result->source.spool_size > 0 && env.batch_slices < spooled_slices)
+        env.batch_slices = spooled_slices;
+    ok = ok && run_passes(b, &env, of_scan, outside, err);
+    if (b->store != NULL)
+        b->result->scratch_bytes = prep_store_scratch_peak(b->store) + b->result->source.spool_size;
     prep_store_destroy(b->store);
+    prep_arena_destroy(b->arena);
     b->store = NULL;
+    b->arena = NULL;
     return ok;
 }
 
@@ -374,11 +443,18 @@ static bool fill_source(mospt_source *to, const prep_source_scan *from, const pr
         to->damage = strdup(named);
         ok = ok && to->damage != NULL;
     }
-    for (int a = 0; a < 3; a++) {
+    for (int a = 0; a < 3 && from->points > 0; a++) {
         to->low[a] = mospt_grid_axis_to_world(grid, a, sums->low[a]);
         to->high[a] = mospt_grid_axis_to_world(grid, a, sums->high[a]);
     }
     return ok;
+}
+
+static bool keep_crs(mospt_source *to, const char *crs, const char *of_site)
+{
+    if (crs[0] == '\0' || strcmp(crs, of_site) == 0) return true;
+    to->crs = strdup(crs);
+    return to->crs != NULL;
 }
 
 static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *err)
@@ -399,7 +475,11 @@ static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *er
     const char *crs = b->options->crs;
     for (uint32_t i = 0; crs == NULL && i < source->scan_count; i++)
         if (source->scans[i].info.crs[0] != '\0') crs = source->scans[i].info.crs;
-    if (crs != NULL && (m->crs = strdup(crs)) == NULL) return mospt_err_nomem(err, strlen(crs));
+    m->crs = strdup(crs != NULL ? crs : "");
+    if (m->crs == NULL) return mospt_err_nomem(err, PREP_CRS_SIZE);
+    for (uint32_t i = 0; i < m->source_count; i++)
+        if (!keep_crs(&m->sources[i], source->scans[i].info.crs, m->crs))
+            return mospt_err_nomem(err, PREP_CRS_SIZE);
     m->points_hash = all.hash;
     m->position_error = all.position_error;
     for (int a = 0; a < 3; a++) {

@@ -26,10 +26,13 @@ typedef struct {
     const char *output;      /* the dataset */
     const char *temp_dir;    /* for scratch files; NULL: beside the output */
     bool force;              /* replace a dataset that is there */
+    bool dedupe;             /* of several points at one position, keep only the first */
     uint32_t threads;        /* 0: one per processor */
     uint64_t memory;         /* bytes, the peak of the process; 0: a quarter of the machine */
     uint32_t inner_depth;    /* 0: 7 */
     prep_scan_options scans; /* columns, poses, crop */
+    const char *attributes;  /* names, separated by commas, of those to keep besides "scan", or
+                                "none"; NULL: all */
     const char *crs;         /* coordinate reference system; NULL: what the scans say */
     /* Told often, by one thread at a time; returns false to stop. NULL: none. */
     bool (*progress)(void *context, const prep_progress *progress);

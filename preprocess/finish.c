@@ -1,28 +1,56 @@
 #include "preprocess/finish.h"
 
+#include "preprocess/feed.h"
+
 #include <pthread.h>
 #include <stdlib.h>
 
+/* A part on its way. First its points are divided among nodes, then these are made one by one. */
+typedef struct {
+    const prep_finish_part *part;
+    uint64_t count;
+    bool is_solved;         /* under the lock, like the counts below */
+    bool on_heap;           /* its memory is not of the arena, for which it is too large */
+    void *memory;           /* owned: for solving, and records that do not stand in memory */
+    const uint8_t **blocks; /* owned */
+    mospt_records records;
+    prep_subtree made;
+    uint32_t first_index;             /* of its nodes in the writer */
+    uint32_t nodes_taken, nodes_done; /* of made.nodes */
+} item;
+
 typedef struct {
     const prep_pass_env *env;
-    const prep_finish_part *parts;
-    uint32_t part_count;
+    uint32_t item_count;
 
     pthread_mutex_t lock;
     pthread_cond_t change;
     /* Under the lock: */
-    uint32_t next_to_take, next_to_write;
-    uint32_t in_flight;
-    size_t memory_left;
+    item *items; /* [item_count]; what is not said to be under the lock is of the thread that solves
+                    it, and is only read after */
+    uint32_t next_to_solve, next_to_place, next_to_emit;
+    uint32_t in_flight; /* taken, and not all nodes written */
     bool failed;
     mospt_err err; /* of the first failure */
 } line;
 
-/* Memory that finishing so many points in one go takes. */
-static size_t memory_for(const prep_pass_env *env, uint64_t count)
+/* One thread's memory for the payload of a node. */
+typedef struct {
+    void *memory; /* [size], owned */
+    size_t size;
+} buffer;
+
+size_t prep_finish_size(size_t record_size, uint64_t count)
 {
-    return (size_t)count *
-           (mospt_record_size(env->shape->schema) + prep_solve_point_size(env->shape));
+    return (size_t)count * record_size + prep_solve_work_size((uint32_t)count);
+}
+
+static uint64_t count_of(const prep_finish_part *part)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < part->spool_count; i++)
+        sum += part->spools[i]->count;
+    return sum;
 }
 
 static bool report_progress(const prep_pass_env *env, mospt_err *err)
@@ -31,116 +59,210 @@ static bool report_progress(const prep_pass_env *env, mospt_err *err)
     return mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
 }
 
-bool prep_finish_write(const prep_pass_env *env, const prep_subtree *made, mospt_err *err)
+/* Bytes for the blocks of a rejection file, of which those on the disk are read, or for the records
+ * of a node, which come from many. */
+static size_t records_size(const prep_pass_env *env, const item *i)
 {
-    for (uint32_t i = 0; i < made->node_count; i++) {
-        const mospt_node *node = &made->nodes[i];
-        if (!mospt_writer_append(env->writer, node, made->payload + node->payload_offset, err))
-            return false;
-    }
-    env->written->points += made->point_count;
-    env->written->points_hash += made->points_hash;
-    return report_progress(env, err);
+    if (i->part->is_node) return (size_t)i->count * mospt_record_size(env->shape->schema);
+    return prep_spool_size_on_disk(env->store, i->part->spools[0]);
 }
 
-/* Takes the next part as soon as there is memory for it; parts are taken in order, so the first one
- * in flight can always be written, and makes room for those after it. Returns false when there is
- * none. */
-static bool take_part(line *l, uint32_t *part, size_t *memory)
+static bool take_memory(const prep_pass_env *env, item *i)
 {
-    pthread_mutex_lock(&l->lock);
-    for (;;) {
-        if (l->failed || l->next_to_take == l->part_count) break;
-        *memory = memory_for(l->env, l->parts[l->next_to_take].spool->count);
-        if (*memory <= l->memory_left || l->in_flight == 0) break;
+    size_t size = prep_solve_work_size((uint32_t)i->count) + records_size(env, i);
+    i->memory = i->on_heap ? malloc(size) : prep_arena_take(env->arena, size);
+    return i->memory != NULL;
+}
+
+/* Gives back all that a part holds. */
+static void fini_item(const prep_pass_env *env, item *i)
+{
+    if (i->on_heap) free(i->memory);
+    else prep_arena_give(env->arena, i->memory);
+    for (uint32_t s = 0; i->blocks != NULL && s < i->part->spool_count; s++)
+        prep_spool_drop(env->store, i->part->spools[s]);
+    prep_subtree_fini(&i->made);
+    free(i->blocks);
+    i->memory = NULL, i->blocks = NULL;
+}
+
+/* Makes the records of a part addressable: `to` is for those that do not stand in memory. */
+static bool collect_records(const prep_pass_env *env, item *i, uint8_t *to, mospt_err *err)
+{
+    const prep_finish_part *part = i->part;
+    uint32_t block_count = part->is_node ? 1 : part->spools[0]->block_count;
+    size_t stride = mospt_record_size(env->shape->schema);
+    i->blocks = malloc(block_count * sizeof *i->blocks);
+    if (i->blocks == NULL) return mospt_err_nomem(err, block_count * sizeof *i->blocks);
+    i->records = (mospt_records){.blocks = i->blocks, .stride = stride};
+    if (!part->is_node) {
+        i->records.shift = prep_store_block_shift(env->store);
+        return prep_spool_view(env->store, part->spools[0], to, i->blocks, err);
+    }
+    i->records.shift = MOSPT_RECORDS_ONE_BLOCK;
+    i->blocks[0] = to;
+    for (uint32_t s = 0; s < part->spool_count; s++) {
+        size_t size = (size_t)part->spools[s]->count * stride;
+        if (!prep_spool_take(env->store, part->spools[s], to, err)) return false;
+        to += size;
+    }
+    return true;
+}
+
+static bool solve_item(const prep_pass_env *env, item *i, mospt_err *err)
+{
+    const prep_finish_part *part = i->part;
+    uint32_t count = (uint32_t)i->count;
+    if (!collect_records(env, i, (uint8_t *)i->memory + prep_solve_work_size(count), err))
+        return false;
+    if (part->is_node)
+        return prep_solve_node(env->shape, part->corner, part->level, part->child_mask, &i->records,
+                               count, i->memory, &i->made, err);
+    return prep_solve(env->shape, part->corner, part->level, &i->records, count, i->memory,
+                      &i->made, err);
+}
+
+/* Under the lock: gives places to the nodes of all that is solved and follows what has its place.
+ */
+static bool place_solved(line *l, mospt_err *err)
+{
+    for (; l->next_to_place < l->item_count && l->items[l->next_to_place].is_solved;
+         l->next_to_place++) {
+        item *i = &l->items[l->next_to_place];
+        for (uint32_t n = 0; n < i->made.node_count; n++) {
+            uint32_t index;
+            if (!mospt_writer_place(l->env->writer, &i->made.nodes[n].node, &index, err))
+                return false;
+            if (n == 0) i->first_index = index;
+        }
+    }
+    return true;
+}
+
+static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, uint64_t *hash,
+                      mospt_err *err)
+{
+    size_t size = prep_solve_emit_size(env->shape, i->made.nodes[n].node.count);
+    if (size > b->size) {
+        free(b->memory);
+        b->memory = malloc(size);
+        b->size = b->memory != NULL ? size : 0;
+        if (b->memory == NULL) return mospt_err_nomem(err, size);
+    }
+    *hash = prep_solve_emit(env->shape, &i->records, &i->made, n, b->memory);
+    return mospt_writer_write(env->writer, &i->made.nodes[n].node, b->memory, err);
+}
+
+/* Under the lock: the account of a node that is written. */
+static bool settle_node(line *l, item *i, uint32_t n, uint64_t hash, mospt_err *err)
+{
+    const mospt_node *node = &i->made.nodes[n].node;
+    mospt_writer_complete(l->env->writer, i->first_index + n, node);
+    l->env->written->points += node->count;
+    l->env->written->points_hash += hash;
+    if (++i->nodes_done == i->made.node_count) {
+        l->in_flight--;
+        fini_item(l->env, i);
+    }
+    return report_progress(l->env, err);
+}
+
+/* Under the lock: the part whose nodes come next, if there is one. */
+static item *next_to_emit(line *l)
+{
+    while (l->next_to_emit < l->next_to_place) {
+        item *i = &l->items[l->next_to_emit];
+        if (i->nodes_taken < i->made.node_count) return i;
+        l->next_to_emit++;
+    }
+    return NULL;
+}
+
+/* Under the lock: the next part to be solved, if there is memory for it. They are taken in order,
+ * so the first one in flight can always be placed and written, and makes room for those after it.
+ */
+static item *next_to_solve(line *l)
+{
+    if (l->next_to_solve == l->item_count) return NULL;
+    item *i = &l->items[l->next_to_solve];
+    bool taken = take_memory(l->env, i);
+    if (!taken && l->in_flight == 0) {
+        /* One node may be larger than the arena: better too much memory than none. */
+        i->on_heap = true;
+        taken = take_memory(l->env, i);
+        l->failed = !taken;
+        if (!taken) mospt_err_nomem(&l->err, (size_t)i->count);
+    }
+    if (!taken) return NULL;
+    l->in_flight++;
+    l->next_to_solve++;
+    return i;
+}
+
+/* Under the lock; does one step without it. Returns false when nothing is left to be done. */
+static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
+{
+    item *i = next_to_emit(l);
+    if (i != NULL) {
+        uint32_t n = i->nodes_taken++;
+        uint64_t hash = 0;
+        pthread_mutex_unlock(&l->lock);
+        *ok = emit_node(l->env, i, n, b, &hash, err);
+        pthread_mutex_lock(&l->lock);
+        *ok = *ok && settle_node(l, i, n, hash, err);
+    } else if ((i = next_to_solve(l)) != NULL) {
+        pthread_mutex_unlock(&l->lock);
+        *ok = solve_item(l->env, i, err);
+        pthread_mutex_lock(&l->lock);
+        i->is_solved = *ok;
+        *ok = *ok && place_solved(l, err);
+    } else if (l->next_to_emit < l->item_count && !l->failed) {
         pthread_cond_wait(&l->change, &l->lock);
+        return true;
+    } else {
+        return false;
     }
-    bool taken = !l->failed && l->next_to_take < l->part_count;
-    if (taken) {
-        *part = l->next_to_take++;
-        if (*memory > l->memory_left) *memory = l->memory_left;
-        l->memory_left -= *memory;
-        l->in_flight++;
-        pthread_cond_broadcast(&l->change);
-    }
-    pthread_mutex_unlock(&l->lock);
-    return taken;
-}
-
-static void fail(line *l, const mospt_err *err)
-{
-    pthread_mutex_lock(&l->lock);
-    if (!l->failed) l->err = *err;
-    l->failed = true;
     pthread_cond_broadcast(&l->change);
-    pthread_mutex_unlock(&l->lock);
-}
-
-static bool solve_part(const prep_pass_env *env, const prep_finish_part *part, prep_subtree *made,
-                       mospt_err *err)
-{
-    uint32_t count = (uint32_t)part->spool->count;
-    size_t size = count * mospt_record_size(env->shape->schema);
-    uint8_t *records = malloc(size);
-    if (records == NULL) return mospt_err_nomem(err, size);
-    bool ok = prep_spool_take(env->store, part->spool, records, err) &&
-              prep_solve(env->shape, part->corner, part->level, records, count, made, err);
-    free(records);
-    return ok;
-}
-
-/* Waits until all parts before this one are written. */
-static bool await_turn(line *l, uint32_t part)
-{
-    pthread_mutex_lock(&l->lock);
-    while (!l->failed && l->next_to_write != part)
-        pthread_cond_wait(&l->change, &l->lock);
-    bool go = !l->failed;
-    pthread_mutex_unlock(&l->lock);
-    return go;
+    return true;
 }
 
 /* Job: one thread's share. */
 static void work_on_line(void *context, uint32_t thread)
 {
     line *l = context;
-    uint32_t part;
-    size_t memory = 0;
+    buffer b = {0};
     (void)thread;
-    while (take_part(l, &part, &memory)) {
+    pthread_mutex_lock(&l->lock);
+    for (bool more = true; more && !l->failed;) {
         mospt_err err = {0};
-        prep_subtree made = {0};
-        bool ok = solve_part(l->env, &l->parts[part], &made, &err);
-        if (ok && !await_turn(l, part)) {
-            prep_subtree_fini(&made);
-            return;
-        }
-        ok = ok && prep_finish_write(l->env, &made, &err);
-        prep_subtree_fini(&made);
-        if (!ok) {
-            fail(l, &err);
-            return;
-        }
-        pthread_mutex_lock(&l->lock);
-        l->next_to_write++;
-        l->in_flight--;
-        l->memory_left += memory;
-        pthread_cond_broadcast(&l->change);
-        pthread_mutex_unlock(&l->lock);
+        bool ok = true;
+        more = step(l, &b, &err, &ok);
+        if (ok || l->failed) continue;
+        l->failed = true;
+        l->err = err;
     }
+    pthread_cond_broadcast(&l->change);
+    pthread_mutex_unlock(&l->lock);
+    free(b.memory);
 }
 
 static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts,
                          uint32_t part_count, mospt_err *err)
 {
-    line l = {
-        .env = env, .parts = parts, .part_count = part_count, .memory_left = env->solve_memory};
+    line l = {.env = env, .item_count = part_count};
     if (part_count == 0) return true;
+    l.items = calloc(part_count, sizeof *l.items);
+    if (l.items == NULL) return mospt_err_nomem(err, part_count * sizeof *l.items);
+    for (uint32_t i = 0; i < part_count; i++)
+        l.items[i] = (item){.part = &parts[i], .count = count_of(&parts[i])};
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
     prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
     pthread_cond_destroy(&l.change);
     pthread_mutex_destroy(&l.lock);
+    for (uint32_t i = 0; i < part_count; i++)
+        fini_item(env, &l.items[i]);
+    free(l.items);
     if (l.failed && err != NULL) *err = l.err;
     return !l.failed;
 }
@@ -148,39 +270,51 @@ static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts
 /* A rejection file that is too large for memory is the input of a pass of its own. */
 static bool finish_large(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
 {
-    size_t stride = mospt_record_size(env->shape->schema);
-    uint32_t block_count = part->spool->block_count, filled = 0, n;
-    uint32_t room = env->batch_count - prep_store_block_capacity(env->store);
     prep_pass *pass = NULL;
-    uint8_t *records = malloc(env->batch_count * stride);
-    if (records == NULL) return mospt_err_nomem(err, env->batch_count * stride);
-    bool ok = prep_pass_begin(env, part->corner, part->level, &pass, err);
-    for (uint32_t i = 0; ok && i < block_count; i++) {
-        ok = prep_spool_take_block(env->store, part->spool, i, records + filled * stride, &n, err);
-        filled += n;
-        if (!ok || (filled <= room && i + 1 < block_count)) continue;
-        ok = prep_pass_insert(pass, records, filled, err);
-        filled = 0;
-        ok = ok && report_progress(env, err);
-    }
-    free(records);
-    if (ok) return prep_pass_end(pass, err);
+    if (!prep_pass_begin(env, part->corner, part->level, &pass, err)) return false;
+    if (prep_feed_spool(env, pass, part->spools[0], err)) return prep_pass_end(pass, err);
     prep_pass_abandon(pass);
     return false;
 }
 
-bool prep_finish(const prep_pass_env *env, const prep_finish_part *parts, uint32_t part_count,
-                 mospt_err *err)
+bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_err *err)
 {
     uint32_t begin = 0;
-    for (uint32_t i = 0; i < part_count; i++) {
-        uint64_t count = parts[i].spool->count;
-        if (count <= UINT32_MAX && memory_for(env, count) <= env->solve_memory) continue;
-        if (!finish_small(env, parts + begin, i - begin, err) || !finish_large(env, &parts[i], err))
+    for (uint32_t i = 0; i < list->part_count; i++) {
+        const prep_finish_part *part = &list->parts[i];
+        if (part->is_node || count_of(part) <= env->solve_points) continue;
+        if (!finish_small(env, list->parts + begin, i - begin, err) ||
+            !finish_large(env, part, err))
             return false;
         begin = i + 1;
     }
-    return finish_small(env, parts + begin, part_count - begin, err);
+    return finish_small(env, list->parts + begin, list->part_count - begin, err);
+}
+
+/* Makes one node of a pile and writes it.
+ * work     for solving and for the payload */
+static bool finish_pile_node(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
+                             bool more, const uint8_t *records, uint32_t count, void *work,
+                             mospt_err *err)
+{
+    prep_subtree made = {0};
+    uint32_t index;
+    mospt_records all = {.blocks = &records,
+                         .stride = mospt_record_size(env->shape->schema),
+                         .shift = MOSPT_RECORDS_ONE_BLOCK};
+    void *payload = (uint8_t *)work + prep_solve_work_size(count);
+    if (!prep_solve_node(env->shape, corner, level, more ? 1 : 0, &all, count, work, &made, err))
+        return false;
+    mospt_node *node = &made.nodes[0].node;
+    bool ok = mospt_writer_place(env->writer, node, &index, err);
+    if (ok) {
+        env->written->points_hash += prep_solve_emit(env->shape, &all, &made, 0, payload);
+        env->written->points += count;
+        mospt_writer_complete(env->writer, index, node);
+        ok = mospt_writer_write(env->writer, node, payload, err) && report_progress(env, err);
+    }
+    prep_subtree_fini(&made);
+    return ok;
 }
 
 bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_t corner[3],
@@ -188,28 +322,27 @@ bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_
 {
     size_t stride = mospt_record_size(env->shape->schema);
     uint32_t block_count = spool->block_count, filled = 0, n;
-    uint32_t room =
-        PREP_PILE_MAX + env->shape->add_threshold + prep_store_block_capacity(env->store);
+    uint32_t most = PREP_PILE_MAX + env->shape->add_threshold,
+             room = most + (1u << prep_store_block_shift(env->store));
     uint64_t left = spool->count;
     bool ok = true;
     uint8_t *records = malloc(room * stride);
-    if (records == NULL) return mospt_err_nomem(err, room * stride);
+    /* For any count up to the most: both sizes grow with it. */
+    void *work = malloc(prep_solve_work_size(most) + prep_solve_emit_size(env->shape, most));
+    if (records == NULL || work == NULL) ok = mospt_err_nomem(err, prep_finish_size(stride, most));
     for (uint32_t i = 0; ok && left > 0;) {
-        while (ok && i < block_count && filled < PREP_PILE_MAX + env->shape->add_threshold) {
+        while (ok && i < block_count && filled < most) {
             ok = prep_spool_take_block(env->store, spool, i++, records + filled * stride, &n, err);
             filled += n;
         }
         /* As prep_solve() does: a rest below the threshold is added to the last node. */
         bool more = left > PREP_PILE_MAX && left - PREP_PILE_MAX >= env->shape->add_threshold;
         uint32_t count = more ? PREP_PILE_MAX : (uint32_t)left;
-        prep_subtree made = {0};
-        ok = ok &&
-             prep_solve_node(env->shape, corner, level, more ? 1 : 0, records, count, &made, err) &&
-             prep_finish_write(env, &made, err);
-        prep_subtree_fini(&made);
+        ok = ok && finish_pile_node(env, corner, level, more, records, count, work, err);
         memmove(records, records + count * stride, (filled - count) * stride);
         filled -= count, left -= count, level++;
     }
-    free(records);
+    prep_spool_drop(env->store, spool);
+    free(records), free(work);
     return ok;
 }

@@ -12,6 +12,9 @@
 
 enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 
+/* Records that are decoded field by field while they are in the first cache. */
+enum { BLOCK = 256 };
+
 /* Described extra bytes beyond this are left out: no scanner writes them, and they multiply the
  * memory of every batch. */
 enum { EXTRA_ROW_MAX = 1024 };
@@ -24,11 +27,10 @@ static const struct {
     {22, 0, 0}, {22, 30, 0}, {22, 30, 36}, {22, 0, 0},  {22, 30, 36},
 };
 
-bool prep_las_sample_init(prep_las_sample *sample, uint64_t record_count, mospt_err *err)
+bool prep_las_sample_init(prep_las_sample *sample, mospt_err *err)
 {
     size_t size = PREP_TONE_SAMPLES * sizeof *sample->intensity;
-    *sample =
-        (prep_las_sample){.step = record_count / PREP_TONE_SAMPLES + 1, .intensity = malloc(size)};
+    *sample = (prep_las_sample){.intensity = malloc(size)};
     return sample->intensity != NULL || mospt_err_nomem(err, size);
 }
 
@@ -44,7 +46,7 @@ void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header,
     uint32_t rgb_at = part[header->point_format].rgb;
     for (size_t i = 0; i < count; i++) {
         const uint8_t *p = records + i * header->record_length;
-        if (sample->seen++ % sample->step == 0 && sample->count < PREP_TONE_SAMPLES)
+        if (sample->count < PREP_TONE_SAMPLES)
             sample->intensity[sample->count++] = prep_le16(p + 12);
         for (uint32_t c = 0; rgb_at != 0 && c < 3; c++) {
             uint16_t value = prep_le16(p + rgb_at + 2 * c);
@@ -231,6 +233,15 @@ static void copy_8(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out
     }
 }
 
+static void copy_6(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+{
+    for (uint32_t i = 0; i < count; i++, p += stride)
+        for (size_t c = 0; c < 6; c += 2) {
+            uint16_t v = prep_le16(p + c);
+            memcpy(out + 6 * (size_t)i + c, &v, 2);
+        }
+}
+
 /* Several components, or sizes that are rare. */
 static void copy_any(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
                      uint8_t *out)
@@ -247,7 +258,8 @@ static void copy_any(const prep_las_field *f, const uint8_t *p, size_t stride, u
 static void copy_field(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
                        uint8_t *out)
 {
-    if (f->components != 1) copy_any(f, p, stride, count, out);
+    if (f->components == 3 && f->size == 2) copy_6(p, stride, count, out);
+    else if (f->components != 1) copy_any(f, p, stride, count, out);
     else if (f->size == 1) copy_1(p, stride, count, out);
     else if (f->size == 2) copy_2(p, stride, count, out);
     else if (f->size == 8) copy_8(p, stride, count, out);
@@ -288,8 +300,8 @@ static void decode_field(const prep_las_field *f, const uint8_t *records, size_t
     }
 }
 
-void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
-                     prep_batch *batch)
+static void decode_block(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
+                         prep_batch *batch)
 {
     uint32_t first = batch->count;
     uint8_t *rgbi = batch->rgbi + 4 * (size_t)first;
@@ -300,4 +312,13 @@ void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint
         decode_field(&layout->field[k], records, layout->record_length, count,
                      batch->plane[k] + first * batch->plane_size[k]);
     batch->count = first + count;
+}
+
+void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
+                     prep_batch *batch)
+{
+    for (uint32_t n; count > 0; count -= n, records += n * (size_t)layout->record_length) {
+        n = count < BLOCK ? count : BLOCK;
+        decode_block(layout, records, n, batch);
+    }
 }

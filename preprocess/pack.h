@@ -24,7 +24,7 @@ extern const prep_pack_sums prep_pack_sums_empty;
 void prep_pack_sums_add(prep_pack_sums *sums, const prep_pack_sums *more);
 
 /* Packs points [begin, end) of a batch.
- * records  out, [batch->count][mospt_record_size()]: the records begin to end - 1 are written
+ * records  out, [end - begin][mospt_record_size()]
  * threads  any */
 void prep_pack(const prep_packer *packer, const prep_batch *batch, uint32_t begin, uint32_t end,
                uint8_t *records, prep_pack_sums *sums);

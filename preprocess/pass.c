@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-enum { OCTANTS = 8, SLICE = 8192 };
+enum { OCTANTS = 8 };
 
 /* An octant at the end of the pass: what was accepted in it level by level, and what goes below. */
 typedef struct {
@@ -14,8 +14,19 @@ typedef struct {
     mospt_err err;
 } bucket;
 
+/* Records on their way into the buckets, slice by slice. */
+typedef struct {
+    uint32_t slice_count;
+    uint8_t *records; /* [batch_slices][PREP_PASS_SLICE][stride], owned */
+    uint32_t *codes;  /* [batch_slices][PREP_PASS_SLICE], owned */
+    uint16_t *order;  /* [batch_slices][PREP_PASS_SLICE], owned: those of each bucket, in turn */
+    uint16_t *begin;  /* [batch_slices][bucket_count + 1], owned: part of each bucket in that */
+    uint32_t *touched, touched_count; /* [bucket_count], owned: buckets with records */
+} batch;
+
 struct prep_pass {
     const prep_pass_env *env;
+    size_t stride; /* of a record, bytes */
     uint32_t corner[3], level;
     uint32_t levels; /* that this pass fills; 0: one position, a pile */
     uint32_t
@@ -25,15 +36,13 @@ struct prep_pass {
     uint32_t bucket_count;
     bucket *buckets; /* [bucket_count], owned */
     prep_spool pile;
+    batch batches[2];
+    batch *prepared; /* the next to go into the buckets; NULL: none */
 
-    /* The batch being inserted: */
-    const uint8_t *records;
-    uint32_t record_count;
-    uint32_t *codes;    /* [batch_count], owned */
-    uint32_t *order;    /* [batch_count], owned: the records of each bucket, in their order */
-    uint32_t *slice_at; /* [slices][bucket_count], owned: counts, then places */
-    uint32_t *begin;    /* [bucket_count + 1], owned: part of each bucket in order */
-    uint32_t *touched;  /* [bucket_count], owned: buckets with records */
+    /* The round being run: */
+    batch *preparing; /* NULL: none */
+    prep_pass_prepare prepare;
+    void *context;
 };
 
 /* Bytes of the bit set for one level of one bucket: as many cells as the bucket has at that depth.
@@ -52,9 +61,24 @@ size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth)
     return sum;
 }
 
-static size_t stride_of(const prep_pass *p)
+static bool batch_init(const prep_pass *p, batch *b, mospt_err *err)
 {
-    return mospt_record_size(p->env->shape->schema);
+    size_t records = (size_t)p->env->batch_slices * PREP_PASS_SLICE;
+    b->records = malloc(records * p->stride);
+    b->codes = malloc(records * sizeof *b->codes);
+    b->order = malloc(records * sizeof *b->order);
+    b->begin = malloc((size_t)p->env->batch_slices * (p->bucket_count + 1) * sizeof *b->begin);
+    b->touched = malloc(p->bucket_count * sizeof *b->touched);
+    if (b->records != NULL && b->codes != NULL && b->order != NULL && b->begin != NULL &&
+        b->touched != NULL)
+        return true;
+    return mospt_err_nomem(err, records * p->stride);
+}
+
+static void batch_fini(batch *b)
+{
+    free(b->records), free(b->codes), free(b->order), free(b->begin), free(b->touched);
+    *b = (batch){0};
 }
 
 bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
@@ -64,6 +88,7 @@ bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_
     prep_pass *p = calloc(1, sizeof *p);
     if (p == NULL) return mospt_err_nomem(err, sizeof *p);
     p->env = env;
+    p->stride = mospt_record_size(env->shape->schema);
     p->level = level;
     for (int a = 0; a < 3; a++)
         p->corner[a] = corner[a];
@@ -80,20 +105,13 @@ bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_
         p->cells_offset[j] = p->cells_size;
         p->cells_size += level_cells_size(p->levels, j, depth);
     }
-    uint32_t slices = (env->batch_count + SLICE - 1) / SLICE;
     p->buckets = calloc(p->bucket_count, sizeof *p->buckets);
-    p->codes = malloc(env->batch_count * sizeof *p->codes);
-    p->order = malloc(env->batch_count * sizeof *p->order);
-    p->slice_at = malloc((size_t)slices * p->bucket_count * sizeof *p->slice_at);
-    p->begin = malloc((p->bucket_count + 1) * sizeof *p->begin);
-    p->touched = malloc(p->bucket_count * sizeof *p->touched);
-    if (p->buckets == NULL || p->codes == NULL || p->order == NULL || p->slice_at == NULL ||
-        p->begin == NULL || p->touched == NULL) {
-        prep_pass_abandon(p);
-        return mospt_err_nomem(err, env->batch_count * 8 + p->bucket_count * sizeof *p->buckets);
-    }
-    *out = p;
-    return true;
+    bool ok = p->buckets != NULL || mospt_err_nomem(err, p->bucket_count * sizeof *p->buckets);
+    for (int b = 0; ok && b < 2; b++)
+        ok = batch_init(p, &p->batches[b], err);
+    if (ok) *out = p;
+    else prep_pass_abandon(p);
+    return ok;
 }
 
 void prep_pass_abandon(prep_pass *p)
@@ -106,40 +124,52 @@ void prep_pass_abandon(prep_pass *p)
         prep_spool_drop(p->env->store, &p->buckets[b].rejected);
     }
     prep_spool_drop(p->env->store, &p->pile);
-    free(p->buckets), free(p->codes), free(p->order), free(p->slice_at), free(p->begin),
-        free(p->touched);
+    for (int b = 0; b < 2; b++)
+        batch_fini(&p->batches[b]);
+    free(p->buckets);
     free(p);
 }
 
-static uint32_t bucket_of(const prep_pass *p, uint32_t code)
+static uint8_t *records_of(const prep_pass *p, const batch *b, uint32_t slice)
 {
-    return code >> 3 * (p->code_levels - p->levels);
+    return b->records + (size_t)slice * PREP_PASS_SLICE * p->stride;
 }
 
-/* Job: codes of a slice of the batch, and how many of them fall into each bucket. */
-static void count_slice(void *context, uint32_t slice)
+/* Parts of the buckets in the order of a slice. */
+static uint16_t *begin_of(const prep_pass *p, const batch *b, uint32_t slice)
 {
-    prep_pass *p = context;
-    size_t stride = stride_of(p);
-    uint32_t bits = mospt_cell_bits(p->env->shape->grid, p->level);
-    uint32_t end = (slice + 1) * SLICE < p->record_count ? (slice + 1) * SLICE : p->record_count;
-    uint32_t *count = p->slice_at + (size_t)slice * p->bucket_count;
-    memset(count, 0, p->bucket_count * sizeof *count);
-    for (uint32_t i = slice * SLICE; i < end; i++) {
-        mospt_vertex v = mospt_vertex_of(p->records + i * stride);
-        p->codes[i] = (uint32_t)mospt_cell_code(v.x, v.y, v.z, bits, p->code_levels);
-        count[bucket_of(p, p->codes[i])]++;
+    return b->begin + (size_t)slice * (p->bucket_count + 1);
+}
+
+/* Job: a slice of the batch being prepared, and the order of its records by bucket (a stable
+ * counting sort). */
+static void prepare_slice(prep_pass *p, uint32_t slice)
+{
+    batch *b = p->preparing;
+    uint8_t *records = records_of(p, b, slice);
+    uint32_t *codes = b->codes + (size_t)slice * PREP_PASS_SLICE;
+    uint16_t *order = b->order + (size_t)slice * PREP_PASS_SLICE, *begin = begin_of(p, b, slice);
+    uint32_t bits = mospt_cell_bits(p->env->shape->grid, p->level), levels = p->code_levels;
+    uint32_t bucket_shift = 3 * (levels - p->levels);
+    size_t stride = p->stride;
+    uint32_t count = p->prepare(p->context, slice, records);
+
+    memset(begin, 0, (p->bucket_count + 1) * sizeof *begin);
+    for (uint32_t i = 0; i < count; i++) {
+        mospt_vertex v = mospt_vertex_of(records + i * stride);
+        codes[i] = mospt_cell_code_short(v.x, v.y, v.z, bits, levels);
+        begin[codes[i] >> bucket_shift]++;
     }
-}
-
-/* Job: puts a slice of the batch in the order of buckets. */
-static void place_slice(void *context, uint32_t slice)
-{
-    prep_pass *p = context;
-    uint32_t end = (slice + 1) * SLICE < p->record_count ? (slice + 1) * SLICE : p->record_count;
-    uint32_t *at = p->slice_at + (size_t)slice * p->bucket_count;
-    for (uint32_t i = slice * SLICE; i < end; i++)
-        p->order[at[bucket_of(p, p->codes[i])]++] = i;
+    for (uint32_t k = 0, sum = 0; k <= p->bucket_count; k++) {
+        uint32_t n = begin[k];
+        begin[k] = (uint16_t)sum;
+        sum += n;
+    }
+    for (uint32_t i = 0; i < count; i++)
+        order[begin[codes[i] >> bucket_shift]++] = (uint16_t)i;
+    /* Each place now stands where the next bucket begins. */
+    memmove(begin + 1, begin, p->bucket_count * sizeof *begin);
+    begin[0] = 0;
 }
 
 static bool take_cell(uint8_t *cells, uint32_t cell)
@@ -150,74 +180,113 @@ static bool take_cell(uint8_t *cells, uint32_t cell)
     return true;
 }
 
-/* Job: sends the records of one bucket to the levels that accept them, or to the rejection file. */
-static void fill_bucket(void *context, uint32_t job)
+static uint32_t cell_at(const prep_pass *p, uint32_t code, uint32_t j)
 {
-    prep_pass *p = context;
-    uint32_t b = p->touched[job], depth = p->env->shape->inner_depth;
+    /* The finest cell at level j is the code down to j + depth levels; of those, the bucket is the
+     * first. */
+    uint32_t bits = 3 * (p->env->shape->inner_depth + j - p->levels);
+    return code >> 3 * (p->levels - 1 - j) & (uint32_t)((UINT64_C(1) << bits) - 1);
+}
+
+/* The first level of the pass that has the cell of a point free; p->levels: none. Whoever took the
+ * cell of the last level had found those of all levels above taken, and they hold it: so one look
+ * is enough for most points. */
+static uint32_t accepting_level(const prep_pass *p, uint8_t *cells, uint32_t code)
+{
+    uint32_t last = p->levels - 1, cell = cell_at(p, code, last);
+    if (cells[p->cells_offset[last] + (cell >> 3)] >> (cell & 7) & 1) return p->levels;
+    for (uint32_t j = 0; j < last; j++)
+        if (take_cell(cells + p->cells_offset[j], cell_at(p, code, j))) return j;
+    return take_cell(cells + p->cells_offset[last], cell) ? last : p->levels;
+}
+
+/* Job: sends the records of one bucket to the levels that accept them, or to the rejection file. */
+static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
+{
     bucket *to = &p->buckets[b];
-    size_t stride = stride_of(p);
-    if (to->cells == NULL && (to->cells = calloc(1, p->cells_size)) == NULL) {
+    size_t stride = p->stride;
+    if (!p->env->divides && to->cells == NULL && (to->cells = calloc(1, p->cells_size)) == NULL) {
         mospt_err_nomem(&to->err, p->cells_size);
         return;
     }
-    for (uint32_t i = p->begin[b]; i < p->begin[b + 1]; i++) {
-        prep_spool *spool = &to->rejected;
-        for (uint32_t j = 0; j < p->levels; j++) {
-            /* The finest cell at level j is the code down to j + depth levels; of those, the bucket
-             * is the first. */
-            uint32_t cell = p->codes[p->order[i]] >> 3 * (p->levels - 1 - j);
-            cell &= (uint32_t)((UINT64_C(1) << 3 * (depth + j - p->levels)) - 1);
-            if (!take_cell(to->cells + p->cells_offset[j], cell)) continue;
-            spool = &to->accepted[j];
+    for (uint32_t s = 0; s < from->slice_count; s++) {
+        const uint8_t *records = records_of(p, from, s);
+        const uint32_t *codes = from->codes + (size_t)s * PREP_PASS_SLICE;
+        const uint16_t *order = from->order + (size_t)s * PREP_PASS_SLICE,
+                       *begin = begin_of(p, from, s);
+        for (uint32_t i = begin[b]; i < begin[b + 1]; i++) {
+            uint32_t j =
+                p->env->divides ? p->levels : accepting_level(p, to->cells, codes[order[i]]);
+            prep_spool *spool = j < p->levels ? &to->accepted[j] : &to->rejected;
+            if (!prep_spool_append(p->env->store, spool, records + order[i] * stride, stride,
+                                   &to->err))
+                return;
+        }
+    }
+}
+
+/* Job: first the buckets of the batch that is prepared, then the slices of the next one. */
+static void run_job(void *context, uint32_t job)
+{
+    prep_pass *p = context;
+    uint32_t fills = p->prepared != NULL ? p->prepared->touched_count : 0;
+    if (job < fills) fill_bucket(p, p->prepared, p->prepared->touched[job]);
+    else prepare_slice(p, job - fills);
+}
+
+static void find_touched(const prep_pass *p, batch *b)
+{
+    b->touched_count = 0;
+    for (uint32_t k = 0; k < p->bucket_count; k++)
+        for (uint32_t s = 0; s < b->slice_count; s++) {
+            const uint16_t *begin = begin_of(p, b, s);
+            if (begin[k] == begin[k + 1]) continue;
+            b->touched[b->touched_count++] = k;
             break;
         }
-        if (!prep_spool_append(p->env->store, spool, p->records + p->order[i] * stride, &to->err))
-            return;
-    }
 }
 
-/* Sums the counts of all slices into the places where each slice puts its records. Returns the
- * buckets touched. */
-static uint32_t share_out(prep_pass *p, uint32_t slices)
+static bool fill_pile(prep_pass *p, const batch *b, mospt_err *err)
 {
-    uint32_t place = 0, touched = 0;
-    for (uint32_t b = 0; b < p->bucket_count; b++) {
-        p->begin[b] = place;
-        for (uint32_t s = 0; s < slices; s++) {
-            uint32_t *at = &p->slice_at[(size_t)s * p->bucket_count + b], n = *at;
-            *at = place;
-            place += n;
-        }
-        if (place > p->begin[b]) p->touched[touched++] = b;
-    }
-    p->begin[p->bucket_count] = place;
-    return touched;
-}
-
-bool prep_pass_insert(prep_pass *p, const uint8_t *records, uint32_t count, mospt_err *err)
-{
-    prep_workers *workers = p->env->workers;
-    uint32_t slices = (count + SLICE - 1) / SLICE;
-    if (p->levels == 0) {
+    for (uint32_t s = 0; s < b->slice_count; s++) {
+        uint32_t count = begin_of(p, b, s)[p->bucket_count];
         for (uint32_t i = 0; i < count; i++)
-            if (!prep_spool_append(p->env->store, &p->pile, records + i * stride_of(p), err))
+            if (!prep_spool_append(p->env->store, &p->pile, records_of(p, b, s) + i * p->stride,
+                                   p->stride, err))
                 return false;
-        return true;
     }
-    p->records = records;
-    p->record_count = count;
-    prep_workers_run(workers, slices, count_slice, p);
-    uint32_t touched = share_out(p, slices);
-    prep_workers_run(workers, slices, place_slice, p);
-    prep_workers_run(workers, touched, fill_bucket, p);
-    for (uint32_t t = 0; t < touched; t++) {
-        const bucket *b = &p->buckets[p->touched[t]];
+    return true;
+}
+
+/* Runs a round: fills the buckets from the batch that is prepared, and prepares the next one, if
+ * there is one. */
+static bool run_round(prep_pass *p, batch *next, mospt_err *err)
+{
+    batch *from = p->prepared;
+    uint32_t fills = from != NULL ? from->touched_count : 0;
+    p->preparing = next;
+    prep_workers_run(p->env->workers, fills + (next != NULL ? next->slice_count : 0), run_job, p);
+    p->prepared = next;
+    for (uint32_t t = 0; t < fills; t++) {
+        const bucket *b = &p->buckets[from->touched[t]];
         if (b->err.code == MOSPT_OK) continue;
         if (err != NULL) *err = b->err;
         return false;
     }
+    if (next == NULL) return true;
+    if (p->levels > 0) find_touched(p, next);
+    else if (!fill_pile(p, next, err)) return false;
     return true;
+}
+
+bool prep_pass_insert(prep_pass *p, uint32_t slice_count, prep_pass_prepare prepare, void *context,
+                      mospt_err *err)
+{
+    batch *next = &p->batches[p->prepared == &p->batches[0] ? 1 : 0];
+    next->slice_count = slice_count;
+    p->prepare = prepare;
+    p->context = context;
+    return run_round(p, next, err);
 }
 
 /* Points at or below level `from` of the pass, in the buckets [begin, end). */
@@ -232,71 +301,44 @@ static uint64_t points_below(const prep_pass *p, uint32_t from, uint32_t begin, 
     return sum;
 }
 
-static bool take_into(prep_pass *p, prep_spool *spool, uint8_t **to, mospt_err *err)
-{
-    size_t size = (size_t)spool->count * stride_of(p);
-    if (!prep_spool_take(p->env->store, spool, *to, err)) return false;
-    *to += size;
-    return true;
-}
-
-/* Collects the points of the node at level `j` of the pass whose buckets are [begin, begin +
- * width): what was accepted there, and all that lies in octants without a child. */
-static bool gather(prep_pass *p, uint32_t j, uint32_t begin, uint32_t width, uint8_t child_mask,
-                   uint8_t *records, mospt_err *err)
+/* The node at level `j` of the pass whose buckets are [begin, begin + width): what was accepted
+ * there, and all that lies in octants without a child. */
+static void list_spools(prep_pass *p, uint32_t j, uint32_t begin, uint32_t width,
+                        prep_finish_part *part)
 {
     for (uint32_t b = begin; b < begin + width; b++) {
         uint32_t octant = (b - begin) / (width / OCTANTS);
-        if (!take_into(p, &p->buckets[b].accepted[j], &records, err)) return false;
-        if (child_mask >> octant & 1) continue;
+        part->spools[part->spool_count++] = &p->buckets[b].accepted[j];
+        if (part->child_mask >> octant & 1) continue;
         for (uint32_t below = j + 1; below < p->levels; below++)
-            if (!take_into(p, &p->buckets[b].accepted[below], &records, err)) return false;
-        if (!take_into(p, &p->buckets[b].rejected, &records, err)) return false;
+            part->spools[part->spool_count++] = &p->buckets[b].accepted[below];
+        part->spools[part->spool_count++] = &p->buckets[b].rejected;
     }
-    return true;
 }
 
-static bool write_node(prep_pass *p, uint32_t j, const uint32_t corner[3], uint32_t begin,
-                       uint32_t width, uint8_t child_mask, uint64_t count, mospt_err *err)
+/* Lists the nodes of the pass from level `j` down, over the buckets [begin, begin + width). */
+static void list_nodes(prep_pass *p, uint32_t j, const uint32_t corner[3], uint32_t begin,
+                       uint32_t width, prep_finish_list *list)
 {
-    bool ok = false;
-    prep_subtree made = {0};
-    uint8_t *records = malloc((size_t)count * stride_of(p));
-    if (records == NULL) return mospt_err_nomem(err, (size_t)count * stride_of(p));
-    if (!gather(p, j, begin, width, child_mask, records, err)) goto done;
-    if (!prep_solve_node(p->env->shape, corner, p->level + j, child_mask, records, (uint32_t)count,
-                         &made, err))
-        goto done;
-    ok = prep_finish_write(p->env, &made, err);
-done:
-    prep_subtree_fini(&made);
-    free(records);
-    return ok;
-}
-
-/* Writes the nodes of the pass from level `j` down, over the buckets [begin, begin + width). */
-static bool write_nodes(prep_pass *p, uint32_t j, const uint32_t corner[3], uint32_t begin,
-                        uint32_t width, mospt_err *err)
-{
-    uint32_t part = width / OCTANTS;
-    uint64_t below[OCTANTS], count = 0;
-    uint8_t child_mask = 0;
-    if (j >= p->levels || j >= PREP_PASS_LEVELS_MAX) return true; /* of the next pass */
-    for (uint32_t o = 0; o < OCTANTS; o++) {
-        below[o] = points_below(p, j + 1, begin + o * part, begin + (o + 1) * part);
-        if (below[o] >= p->env->shape->add_threshold) child_mask |= (uint8_t)(1u << o);
-        else count += below[o];
-    }
-    for (uint32_t b = begin; b < begin + width; b++)
-        count += p->buckets[b].accepted[j].count;
-    if (!write_node(p, j, corner, begin, width, child_mask, count, err)) return false;
+    uint32_t step = width / OCTANTS;
+    if (j >= p->levels || j >= PREP_PASS_LEVELS_MAX) return; /* of the next pass */
+    prep_finish_part *part = &list->parts[list->part_count++];
+    *part = (prep_finish_part){.spools = list->spools + list->spool_count,
+                               .level = p->level + j,
+                               .is_node = true,
+                               .corner = {corner[0], corner[1], corner[2]}};
+    for (uint32_t o = 0; o < OCTANTS; o++)
+        if (points_below(p, j + 1, begin + o * step, begin + (o + 1) * step) >=
+            p->env->shape->add_threshold)
+            part->child_mask |= (uint8_t)(1u << o);
+    list_spools(p, j, begin, width, part);
+    list->spool_count += part->spool_count;
     for (uint32_t o = 0; o < OCTANTS; o++) {
         uint32_t child[3];
-        if (!(child_mask >> o & 1)) continue;
+        if (!(part->child_mask >> o & 1)) continue;
         mospt_cell_child(p->env->shape->grid, corner, p->level + j, o, child);
-        if (!write_nodes(p, j + 1, child, begin + o * part, part, err)) return false;
+        list_nodes(p, j + 1, child, begin + o * step, step, list);
     }
-    return true;
 }
 
 static bool seal_buckets(prep_pass *p, mospt_err *err)
@@ -320,28 +362,63 @@ static void bucket_corner(const prep_pass *p, uint32_t b, uint32_t out[3])
                          out);
 }
 
-static bool finish_buckets(prep_pass *p, mospt_err *err)
+/* Lists the rejection files that are left. */
+static void list_buckets(prep_pass *p, prep_finish_list *list)
 {
-    prep_finish_part *parts = malloc(p->bucket_count * sizeof *parts);
-    uint32_t part_count = 0;
-    if (parts == NULL) return mospt_err_nomem(err, p->bucket_count * sizeof *parts);
     for (uint32_t b = 0; b < p->bucket_count; b++) {
-        if (p->buckets[b].rejected.count == 0) continue;
-        prep_finish_part *part = &parts[part_count++];
-        *part = (prep_finish_part){.spool = &p->buckets[b].rejected, .level = p->level + p->levels};
+        /* An octant without a child has given them to a node above. */
+        if (p->buckets[b].rejected.count < p->env->shape->add_threshold) continue;
+        prep_finish_part *part = &list->parts[list->part_count++];
+        *part = (prep_finish_part){.spools = list->spools + list->spool_count,
+                                   .spool_count = 1,
+                                   .level = p->level + p->levels};
+        list->spools[list->spool_count++] = &p->buckets[b].rejected;
         bucket_corner(p, b, part->corner);
     }
-    bool ok = prep_finish(p->env, parts, part_count, err);
-    free(parts);
+}
+
+static bool finish(prep_pass *p, mospt_err *err)
+{
+    /* At most one node over each bucket and level; every spool is in one part. */
+    size_t parts_max = p->bucket_count * (1 + (size_t)p->levels),
+           spools_max = p->bucket_count * (1 + (size_t)p->levels);
+    prep_finish_list list = {.parts = malloc(parts_max * sizeof *list.parts),
+                             .spools = malloc(spools_max * sizeof *list.spools)};
+    bool ok = list.parts != NULL && list.spools != NULL;
+    if (ok) {
+        list_nodes(p, 0, p->corner, 0, p->bucket_count, &list);
+        list_buckets(p, &list);
+        ok = prep_finish(p->env, &list, err);
+    } else {
+        mospt_err_nomem(err, parts_max * sizeof *list.parts);
+    }
+    free(list.parts), free(list.spools);
     return ok;
 }
 
 bool prep_pass_end(prep_pass *p, mospt_err *err)
 {
-    bool ok = seal_buckets(p, err);
+    bool ok = run_round(p, NULL, err) && seal_buckets(p, err);
+    for (int b = 0; b < 2; b++)
+        batch_fini(&p->batches[b]);
     if (ok && p->levels == 0) ok = prep_finish_pile(p->env, &p->pile, p->corner, p->level, err);
-    else if (ok && points_below(p, 0, 0, p->bucket_count) > 0)
-        ok = write_nodes(p, 0, p->corner, 0, p->bucket_count, err) && finish_buckets(p, err);
+    else if (ok && points_below(p, 0, 0, p->bucket_count) > 0) ok = finish(p, err);
+    prep_pass_abandon(p);
+    return ok;
+}
+
+bool prep_pass_divide(prep_pass *p, prep_pass_part part, void *context, mospt_err *err)
+{
+    bool ok = run_round(p, NULL, err) && seal_buckets(p, err);
+    for (int b = 0; b < 2; b++)
+        batch_fini(&p->batches[b]);
+    if (ok && p->levels == 0) ok = part(context, &p->pile, p->corner, p->level, err);
+    for (uint32_t b = 0; ok && p->levels > 0 && b < p->bucket_count; b++) {
+        uint32_t corner[3];
+        bucket_corner(p, b, corner);
+        if (p->buckets[b].rejected.count > 0)
+            ok = part(context, &p->buckets[b].rejected, corner, p->level + p->levels, err);
+    }
     prep_pass_abandon(p);
     return ok;
 }

@@ -13,11 +13,15 @@
  * is locked. */
 #pragma once
 #include "mospt/writer.h"
+#include "preprocess/arena.h"
 #include "preprocess/solve.h"
 #include "preprocess/spool.h"
 #include "preprocess/workers.h"
 
-enum { PREP_PASS_LEVELS_MAX = 3 };
+enum {
+    PREP_PASS_LEVELS_MAX = 3,
+    PREP_PASS_SLICE = 8192, /* records that one thread prepares at a time: they fit its cache */
+};
 
 /* What has been written so far. */
 typedef struct {
@@ -32,9 +36,11 @@ typedef struct {
     prep_workers *workers;
     prep_store *store;
     mospt_writer *writer;
+    prep_arena *arena;     /* for rejection files being finished */
+    bool divides;          /* nothing is accepted: points are only divided among octants */
     uint32_t levels;       /* of the outer octree that one pass fills, 1 to PREP_PASS_LEVELS_MAX */
-    uint32_t batch_count;  /* records that one call inserts at most */
-    size_t solve_memory;   /* bytes for rejection files being finished */
+    uint32_t batch_slices; /* that one call inserts at most */
+    uint64_t solve_points; /* rejection files up to so many points are finished in one go */
     prep_written *written; /* borrowed, added to */
     prep_pass_report report;
     void *report_context;
@@ -49,12 +55,26 @@ size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth);
 bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
                      prep_pass **out, mospt_err *err);
 
-/* Inserts records, all inside the node, in the order in which they arrive.
- * records  [count][mospt_record_size()], count at most env->batch_count */
-bool prep_pass_insert(prep_pass *pass, const uint8_t *records, uint32_t count, mospt_err *err);
+/* Writes the records of a slice of a batch, at most PREP_PASS_SLICE, all inside the node. Returns
+ * how many. A job: it touches only what its index names. */
+typedef uint32_t (*prep_pass_prepare)(void *context, uint32_t slice, uint8_t *records);
+
+/* Inserts a batch. Its slices are prepared now, in any order and by all workers; the records are
+ * sent to their cells, in the order of the slices, together with the next batch.
+ * slice_count  at most env->batch_slices */
+bool prep_pass_insert(prep_pass *pass, uint32_t slice_count, prep_pass_prepare prepare,
+                      void *context, mospt_err *err);
 
 /* Writes the nodes of the pass and all that is below them. Frees the pass, also when it fails. */
 bool prep_pass_end(prep_pass *pass, mospt_err *err);
+
+/* What lies in an octant. */
+typedef bool (*prep_pass_part)(void *context, prep_spool *spool, const uint32_t corner[3],
+                               uint32_t level, mospt_err *err);
+
+/* Ends a pass that only divides: hands over what lies in each octant, in Morton order, or all that
+ * lies at one position. Frees the pass, also when it fails. */
+bool prep_pass_divide(prep_pass *pass, prep_pass_part part, void *context, mospt_err *err);
 
 /* Frees a pass that will not be ended. NULL is fine. */
 void prep_pass_abandon(prep_pass *pass);

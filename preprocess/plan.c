@@ -1,13 +1,17 @@
 #include "preprocess/plan.h"
 
-#include "preprocess/pass.h"
+#include "preprocess/finish.h"
 
 #include <unistd.h>
 
 /* The program, its libraries and stacks (6 MiB where a file has one point), the buffers of the
  * readers, and what the allocator keeps. */
 static const uint64_t FIXED_SIZE = UINT64_C(24) << 20;
-enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 1 << 20, BATCH_MIN = 8192, BATCH_MAX = 65536, BATCHES = 4 };
+/* Blocks are large enough for a disk, and small enough that thousands of spools with a few points
+ * each waste little. */
+enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 80 << 10, SLICES_MAX = 8 };
+/* Rejection files of more points are cut by another pass, which all threads share. */
+enum { SOLVE_POINTS_MAX = 1 << 22 };
 
 uint64_t prep_plan_machine_memory(void)
 {
@@ -19,6 +23,12 @@ uint64_t prep_plan_machine_memory(void)
 static uint64_t open_spools(uint32_t levels)
 {
     return (UINT64_C(1) << 3 * levels) * (levels + 1);
+}
+
+/* Bytes of a slice in the two batches of a pass and the four of the readers. */
+static uint64_t slice_size(size_t record_size)
+{
+    return PREP_PASS_SLICE * (2 * (record_size + 6) + 4 * (record_size + 32));
 }
 
 bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out,
@@ -39,13 +49,11 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
     plan.block_size = (size_t)(block < BLOCK_MIN   ? BLOCK_MIN
                                : block > BLOCK_MAX ? BLOCK_MAX
                                                    : block);
-    uint64_t batch = memory / 16 / (BATCHES * 2 * (record_size + 32));
-    plan.batch_count = (uint32_t)(batch < BATCH_MIN   ? BATCH_MIN
-                                  : batch > BATCH_MAX ? BATCH_MAX
-                                                      : batch);
+    uint64_t slices = memory / 16 / slice_size(record_size);
+    plan.batch_slices = (uint32_t)(slices < 1 ? 1 : slices > SLICES_MAX ? SLICES_MAX : slices);
 
-    uint64_t taken = FIXED_SIZE + cells + spools * plan.block_size +
-                     (uint64_t)plan.batch_count * BATCHES * 2 * (record_size + 32);
+    uint64_t taken =
+        FIXED_SIZE + cells + spools * plan.block_size + plan.batch_slices * slice_size(record_size);
     if (memory < (uint64_t)PREP_MEMORY_MIN_MIB << 20 || memory < taken + (taken >> 3))
         return mospt_err_set(
             err, MOSPT_EINVAL, mospt_nowhere(),
@@ -57,6 +65,8 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
                                      : PREP_MEMORY_MIN_MIB));
     plan.solve_memory = (size_t)((memory - taken) / 8 * 4);
     plan.store_memory = (size_t)((memory - taken) / 8 * 3);
+    plan.solve_points = plan.solve_memory / prep_finish_size(record_size, 1);
+    if (plan.solve_points > SOLVE_POINTS_MAX) plan.solve_points = SOLVE_POINTS_MAX;
     *out = plan;
     return true;
 }

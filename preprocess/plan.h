@@ -5,11 +5,12 @@
 enum { PREP_MEMORY_MIN_MIB = 64 };
 
 typedef struct {
-    uint32_t levels;      /* of the outer octree that one pass fills */
-    uint32_t batch_count; /* records per batch */
-    size_t block_size;    /* of spools, bytes */
-    size_t store_memory;  /* bytes of full blocks that stay in memory */
-    size_t solve_memory;  /* bytes for rejection files being finished */
+    uint32_t levels;       /* of the outer octree that one pass fills */
+    uint32_t batch_slices; /* of PREP_PASS_SLICE records per batch */
+    size_t block_size;     /* of spools, bytes, at most */
+    size_t store_memory;   /* bytes of full blocks that stay in memory */
+    size_t solve_memory;   /* bytes for rejection files being finished */
+    uint64_t solve_points; /* of a rejection file that is finished in one go, at most */
 } prep_plan;
 
 /* Memory of this machine, bytes. */

@@ -22,8 +22,8 @@ static const double COORDINATE_MAX = 1e15;
 
 const char *prep_drop_name(prep_drop reason)
 {
-    static const char *const names[PREP_DROP_REASONS] = {"not finite", "out of range", "no return",
-                                                         "unreadable", "outside the crop"};
+    static const char *const names[PREP_DROP_REASONS] = {
+        "not finite", "out of range", "no return", "unreadable", "outside the crop", "duplicate"};
     return reason < PREP_DROP_REASONS ? names[reason] : "unknown";
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 #include "preprocess/batch.h"
 #include "preprocess/pose.h"
+#include "preprocess/scan_memory.h"
 
 /* Why a point of a scan is not in the dataset. */
 typedef enum {
@@ -17,10 +18,11 @@ typedef enum {
                                invalid */
     PREP_DROP_UNREADABLE,   /* a line or a record that is no point */
     PREP_DROP_CROPPED,      /* outside the box that was asked for */
+    PREP_DROP_DUPLICATE,    /* at the position of a point before it, if those are to be left out */
     PREP_DROP_REASONS,
 } prep_drop;
 
-/* "not finite", "out of range", "no return", "unreadable", "outside the crop" */
+/* "not finite", "out of range", "no return", "unreadable", "outside the crop", "duplicate" */
 const char *prep_drop_name(prep_drop reason);
 
 enum { PREP_CRS_SIZE = 4096 };
@@ -55,6 +57,8 @@ typedef struct {
     const prep_pose_list *poses; /* borrowed; NULL: only sidecars move scans */
     bool has_crop;
     double crop_low[3], crop_high[3]; /* metres, world: what lies outside is dropped and counted */
+    prep_scan_memory *memory;         /* borrowed; for whoever opens many scans of a file in turn;
+                                         NULL: each finds its place in the file by itself */
 } prep_scan_options;
 
 /* Opens scan `index` of a file, whose format is recognised by content first and by name last.

@@ -8,148 +8,161 @@ enum { OCTANTS = 8 };
 
 typedef struct {
     const prep_shape *shape;
-    const uint8_t *records;
-    size_t stride;
-    mospt_linear_key *keys; /* [count] sorted; rejected points move to the front of a node's part */
-    mospt_linear_key *spare; /* [count] for sorting, and for the points of the node being made */
-    void *work;
-    uint32_t *order; /* [count] */
+    prep_sorter sorter;
+    uint64_t *keys;      /* [count] sorted; rejected points move to the front of a node's part */
+    uint32_t kept_count; /* of made.keys; the rest of them is room for sorting what is left */
     prep_subtree made;
 } solver;
 
 void prep_subtree_fini(prep_subtree *subtree)
 {
-    free(subtree->nodes), free(subtree->payload);
+    free(subtree->nodes);
     *subtree = (prep_subtree){0};
 }
 
-size_t prep_solve_point_size(const prep_shape *shape)
+size_t prep_solve_work_size(uint32_t count)
 {
-    return 2 * sizeof(mospt_linear_key) + mospt_linear_work_size(1) + sizeof(uint32_t) +
-           mospt_record_size(shape->schema);
+    return count * (2 * sizeof(uint64_t) + sizeof(uint32_t));
 }
 
-static bool solver_init(solver *s, const prep_shape *shape, const uint8_t *records, uint32_t count,
-                        mospt_err *err)
+static void solver_init(solver *s, const prep_shape *shape, const mospt_records *records,
+                        uint32_t count, void *work)
 {
-    *s = (solver){.shape = shape, .records = records, .stride = mospt_record_size(shape->schema)};
-    s->keys = malloc(count * sizeof *s->keys);
-    s->spare = malloc(count * sizeof *s->spare);
-    s->work = malloc(mospt_linear_work_size(count));
-    s->order = malloc(count * sizeof *s->order);
-    s->made.payload = malloc(count * s->stride);
-    if (s->keys == NULL || s->spare == NULL || s->work == NULL || s->order == NULL ||
-        s->made.payload == NULL)
-        return mospt_err_nomem(err, count * prep_solve_point_size(shape));
-    for (uint32_t i = 0; i < count; i++)
-        s->keys[i].index = i;
+    *s = (solver){.shape = shape, .keys = work, .made.count = count};
+    s->made.keys = s->keys + count;
+    s->made.colours = (uint32_t *)(s->made.keys + count);
+    s->sorter = (prep_sorter){.grid = shape->grid, .records = records, .colours = s->made.colours};
+    prep_sort_begin(&s->sorter, s->keys, count);
+    s->made.index_bits = s->sorter.index_bits;
+}
+
+static uint32_t index_of(const solver *s, uint64_t key)
+{
+    return mospt_linear_index(key, s->made.index_bits);
+}
+
+static bool reserve(prep_subtree *made, mospt_err *err)
+{
+    if (made->node_count < made->node_capacity) return true;
+    uint32_t capacity = made->node_capacity > 0 ? 2 * made->node_capacity : 16;
+    prep_solved *nodes = realloc(made->nodes, capacity * sizeof *nodes);
+    if (nodes == NULL) return mospt_err_nomem(err, capacity * sizeof *nodes);
+    made->nodes = nodes;
+    made->node_capacity = capacity;
     return true;
 }
 
-static void solver_fini(solver *s)
+/* Where the keys that the next node keeps go. */
+static uint64_t *room(const solver *s)
 {
-    free(s->keys), free(s->spare), free(s->work), free(s->order);
-    prep_subtree_fini(&s->made);
+    return s->made.keys + s->kept_count;
 }
 
-static mospt_node *add_node(prep_subtree *made, mospt_err *err)
+/* There is room for that: none of the keys is kept yet. */
+static void sort_below(solver *s, uint32_t level, uint64_t *keys, uint32_t count)
 {
-    if (made->node_count == made->node_capacity) {
-        uint32_t capacity = made->node_capacity > 0 ? 2 * made->node_capacity : 16;
-        mospt_node *nodes = realloc(made->nodes, capacity * sizeof *nodes);
-        if (nodes == NULL) {
-            mospt_err_nomem(err, capacity * sizeof *nodes);
-            return NULL;
-        }
-        made->nodes = nodes;
-        made->node_capacity = capacity;
-    }
-    return &made->nodes[made->node_count++];
+    prep_sort_below(&s->sorter, level, keys, room(s), count);
 }
 
-/* Codes of 21 levels below the node at `level`, in rising order. */
-static void sort_below(solver *s, uint32_t level, mospt_linear_key *keys, uint32_t count)
+/* Makes a node of the next `count` keys in the room. */
+static bool keep(solver *s, const uint32_t corner[3], uint32_t level, uint8_t child_mask,
+                 uint32_t cell_shift, uint32_t count, mospt_err *err)
 {
-    uint32_t bits = mospt_cell_bits(s->shape->grid, level);
-    for (uint32_t i = 0; i < count; i++) {
-        mospt_vertex v = mospt_vertex_of(s->records + keys[i].index * s->stride);
-        keys[i].code = mospt_cell_code(v.x, v.y, v.z, bits, MOSPT_CODE_LEVELS);
-    }
-    prep_sort_keys(keys, s->spare + (keys - s->keys), count);
-}
-
-static bool emit(solver *s, const uint32_t corner[3], uint32_t level, uint8_t child_mask,
-                 uint32_t code_shift, mospt_linear_key *keys, uint32_t count, mospt_err *err)
-{
-    mospt_linear_input input = {.records = s->records,
-                                .stride = s->stride,
-                                .depth = s->shape->inner_depth,
-                                .code_shift = code_shift};
     if (level > UINT16_MAX)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "more than %d levels: too many points at one position", UINT16_MAX);
-    mospt_node *node = add_node(&s->made, err);
-    if (node == NULL) return false;
-    *node = (mospt_node){.corner = {corner[0], corner[1], corner[2]},
-                         .level = (uint16_t)level,
-                         .child_mask = child_mask,
-                         .payload_offset = s->made.point_count * s->stride};
-    mospt_linear_build(&input, keys, count, s->work, s->order, node->level_end);
-    uint8_t *payload = s->made.payload + node->payload_offset;
-    mospt_payload_pack(s->shape->schema, s->records, s->order, count, payload, node);
-    s->made.point_count += count;
-    s->made.points_hash += mospt_payload_points_hash(s->shape->schema, payload,
-                                                     payload + count * sizeof(mospt_vertex), count);
+    if (!reserve(&s->made, err)) return false;
+    s->made.nodes[s->made.node_count++] = (prep_solved){
+        .first = s->kept_count,
+        .cell_shift = cell_shift,
+        .node = {.corner = {corner[0], corner[1], corner[2]},
+                 .level = (uint16_t)level,
+                 .child_mask = child_mask,
+                 .count = count,
+                 .payload_size = (uint64_t)count * mospt_record_size(s->shape->schema)}};
+    s->kept_count += count;
     return true;
 }
 
 /* All points at one position: the first PREP_PILE_MAX of them, then a child with the next, and so
- * on. */
-static bool solve_pile(solver *s, const uint32_t corner[3], uint32_t level, mospt_linear_key *keys,
+ * on.
+ * keys     as they arrived */
+static bool solve_pile(solver *s, const uint32_t corner[3], uint32_t level, uint64_t *keys,
                        uint32_t count, mospt_err *err)
 {
+    memcpy(room(s), keys, count * sizeof *keys);
     while (count > 0) {
         uint32_t n = count;
         if (n > PREP_PILE_MAX && n - PREP_PILE_MAX >= s->shape->add_threshold) n = PREP_PILE_MAX;
-        if (!emit(s, corner, level, n < count ? 1 : 0, 0, keys, n, err)) return false;
-        keys += n, count -= n, level++;
+        if (!keep(s, corner, level, n < count ? 1 : 0, s->made.index_bits, n, err)) return false;
+        count -= n, level++;
     }
     return true;
 }
 
-static uint32_t octant_of(uint64_t code, uint32_t shift)
+/* Where the keys of the octant end that the first one is in. */
+static uint32_t octant_end(const uint64_t *keys, uint32_t count, uint32_t octant_shift)
 {
-    return (uint32_t)(code >> shift) & (OCTANTS - 1);
+    uint32_t low = 1, high = count;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (keys[middle] >> octant_shift == keys[0] >> octant_shift) low = middle + 1;
+        else high = middle;
+    }
+    return low;
 }
 
-/* Splits the keys of a node: those that it keeps go to `kept`, the others stay in front of `keys`;
- * both in their order. Which octants reject is decided here. rejected  out, [OCTANTS] */
-static uint32_t split(const solver *s, mospt_linear_key *keys, uint32_t count, uint32_t cell_shift,
-                      uint32_t octant_shift, mospt_linear_key *kept, uint32_t rejected[OCTANTS])
+/* Points that find their finest cell taken. */
+static uint32_t count_rejected(const uint64_t *keys, uint32_t count, uint32_t cell_shift)
+{
+    uint32_t sum = 0;
+    for (uint32_t i = 1; i < count; i++)
+        sum += keys[i] >> cell_shift == keys[i - 1] >> cell_shift;
+    return sum;
+}
+
+/* Sends the first point that arrived in each cell to `kept`, and the others, in their order, to
+ * `rejected`, which may overlap `keys` from below. Returns how many are kept. */
+static uint32_t reject(const solver *s, const uint64_t *keys, uint32_t count, uint32_t cell_shift,
+                       uint64_t *kept, uint64_t *rejected)
+{
+    uint32_t cells = 0;
+    for (uint32_t a = 0, b; a < count; a = b) {
+        uint64_t cell = keys[a] >> cell_shift, first_key = keys[a];
+        uint32_t first = a;
+        for (b = a + 1; b < count && keys[b] >> cell_shift == cell; b++) {
+            bool earlier = index_of(s, keys[b]) < index_of(s, first_key);
+            first = earlier ? b : first;
+            first_key = earlier ? keys[b] : first_key;
+        }
+        kept[cells++] = first_key;
+        for (uint32_t i = a; i < first; i++)
+            *rejected++ = keys[i];
+        for (uint32_t i = first + 1; i < b; i++)
+            *rejected++ = keys[i];
+    }
+    return cells;
+}
+
+/* Splits the keys of a node: those that it keeps go to `kept`, the others stay in front of `keys`.
+ * Which octants reject is decided here.
+ * rejected  out, [OCTANTS] */
+static uint32_t split(const solver *s, uint64_t *keys, uint32_t count, uint32_t cell_shift,
+                      uint32_t octant_shift, uint64_t *kept, uint32_t rejected[OCTANTS])
 {
     uint32_t kept_count = 0, left = 0;
-    for (int o = 0; o < OCTANTS; o++)
-        rejected[o] = 0;
-    for (uint32_t i = 1; i < count; i++)
-        if (keys[i].code >> cell_shift == keys[i - 1].code >> cell_shift)
-            rejected[octant_of(keys[i].code, octant_shift)]++;
-    for (int o = 0; o < OCTANTS; o++)
-        if (rejected[o] < s->shape->add_threshold) rejected[o] = 0;
-
-    for (uint32_t a = 0, b; a < count; a = b) {
-        uint64_t cell = keys[a].code >> cell_shift;
-        uint32_t first = a;
-        for (b = a + 1; b < count && keys[b].code >> cell_shift == cell; b++)
-            if (keys[b].index < keys[first].index) first = b;
-        bool rejects = rejected[octant_of(keys[a].code, octant_shift)] > 0;
-        mospt_linear_key accepted = keys[first];
-        for (uint32_t i = a; rejects && i < b; i++)
-            if (i != first) keys[left++] = keys[i];
-        if (rejects) {
-            kept[kept_count++] = accepted;
+    memset(rejected, 0, OCTANTS * sizeof *rejected);
+    for (uint32_t a = 0, n; a < count; a += n) {
+        uint32_t octant = (uint32_t)(keys[a] >> octant_shift) & (OCTANTS - 1);
+        n = octant_end(keys + a, count - a, octant_shift);
+        uint32_t more = n < s->shape->add_threshold ? 0 : count_rejected(keys + a, n, cell_shift);
+        if (more > 0 && more >= s->shape->add_threshold) {
+            kept_count += reject(s, keys + a, n, cell_shift, kept + kept_count, keys + left);
+            rejected[octant] = more;
+            left += more;
         } else {
-            memcpy(kept + kept_count, keys + a, (b - a) * sizeof *keys);
-            kept_count += b - a;
+            memcpy(kept + kept_count, keys + a, n * sizeof *keys);
+            kept_count += n;
         }
     }
     return kept_count;
@@ -157,31 +170,27 @@ static uint32_t split(const solver *s, mospt_linear_key *keys, uint32_t count, u
 
 /* base     level at which the codes of `keys` begin */
 static bool solve_node(solver *s, const uint32_t corner[3], uint32_t level, uint32_t base,
-                       mospt_linear_key *keys, uint32_t count, mospt_err *err)
+                       uint64_t *keys, uint32_t count, mospt_err *err)
 {
     uint32_t depth = s->shape->inner_depth, rejected[OCTANTS];
-    mospt_linear_key *spare = s->spare + (keys - s->keys);
 
     if (mospt_cell_bits(s->shape->grid, level) == 0) {
-        /* In the order of arrival, which is that of the indices. */
         for (uint32_t i = 0; i < count; i++)
-            keys[i].code = keys[i].index;
-        prep_sort_keys(keys, spare, count);
-        for (uint32_t i = 0; i < count; i++)
-            keys[i].code = 0;
+            keys[i] = (uint64_t)index_of(s, keys[i]);
+        prep_sort_keys(keys, room(s), count, 0);
         return solve_pile(s, corner, level, keys, count, err);
     }
-    if (level - base + depth > MOSPT_CODE_LEVELS) {
+    if (level - base + depth > s->sorter.code_levels) {
         base = level;
         sort_below(s, level, keys, count);
     }
-    uint32_t cell_shift = 3 * (MOSPT_CODE_LEVELS - (level - base) - depth);
-    uint32_t octant_shift = 3 * (MOSPT_CODE_LEVELS - (level - base) - 1);
-    uint32_t kept = split(s, keys, count, cell_shift, octant_shift, spare, rejected);
+    uint32_t cell_shift = s->made.index_bits + 3 * (s->sorter.code_levels - (level - base) - depth);
+    uint32_t octant_shift = s->made.index_bits + 3 * (s->sorter.code_levels - (level - base) - 1);
+    uint32_t kept = split(s, keys, count, cell_shift, octant_shift, room(s), rejected);
     uint8_t child_mask = 0;
     for (int o = 0; o < OCTANTS; o++)
         if (rejected[o] > 0) child_mask |= (uint8_t)(1u << o);
-    if (!emit(s, corner, level, child_mask, cell_shift, spare, kept, err)) return false;
+    if (!keep(s, corner, level, child_mask, cell_shift, kept, err)) return false;
     for (uint32_t o = 0; o < OCTANTS; o++) {
         uint32_t child[3];
         if (rejected[o] == 0) continue;
@@ -193,31 +202,61 @@ static bool solve_node(solver *s, const uint32_t corner[3], uint32_t level, uint
 }
 
 bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
-                const uint8_t *records, uint32_t count, prep_subtree *out, mospt_err *err)
+                const mospt_records *records, uint32_t count, void *work, prep_subtree *out,
+                mospt_err *err)
 {
     solver s;
-    bool ok = solver_init(&s, shape, records, count, err);
-    if (ok) {
-        sort_below(&s, level, s.keys, count);
-        ok = solve_node(&s, corner, level, level, s.keys, count, err);
-    }
-    if (ok) *out = s.made, s.made = (prep_subtree){0};
-    solver_fini(&s);
+    solver_init(&s, shape, records, count, work);
+    sort_below(&s, level, s.keys, count);
+    bool ok = solve_node(&s, corner, level, level, s.keys, count, err);
+    if (ok) *out = s.made;
+    else prep_subtree_fini(&s.made);
     return ok;
 }
 
 bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
-                     uint8_t child_mask, const uint8_t *records, uint32_t count, prep_subtree *out,
-                     mospt_err *err)
+                     uint8_t child_mask, const mospt_records *records, uint32_t count, void *work,
+                     prep_subtree *out, mospt_err *err)
 {
     solver s;
-    bool ok = solver_init(&s, shape, records, count, err);
-    if (ok) {
-        sort_below(&s, level, s.keys, count);
-        ok = emit(&s, corner, level, child_mask, 3 * (MOSPT_CODE_LEVELS - shape->inner_depth),
-                  s.keys, count, err);
-    }
-    if (ok) *out = s.made, s.made = (prep_subtree){0};
-    solver_fini(&s);
+    solver_init(&s, shape, records, count, work);
+    sort_below(&s, level, s.keys, count);
+    memcpy(room(&s), s.keys, count * sizeof *s.keys);
+    bool ok = keep(&s, corner, level, child_mask,
+                   s.made.index_bits + 3 * (s.sorter.code_levels - shape->inner_depth), count, err);
+    if (ok) *out = s.made;
+    else prep_subtree_fini(&s.made);
     return ok;
+}
+
+/* The payload, which may end anywhere, the order, and what the linearisation needs. */
+static size_t payload_room(const prep_shape *shape, uint32_t count)
+{
+    return (count * mospt_record_size(shape->schema) + sizeof(uint64_t) - 1) / sizeof(uint64_t) *
+           sizeof(uint64_t);
+}
+
+size_t prep_solve_emit_size(const prep_shape *shape, uint32_t count)
+{
+    return payload_room(shape, count) + count * sizeof(uint32_t) + mospt_linear_work_size(count);
+}
+
+uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
+                         prep_subtree *subtree, uint32_t n, void *memory)
+{
+    prep_solved *solved = &subtree->nodes[n];
+    mospt_node *node = &solved->node;
+    uint32_t count = node->count;
+    uint8_t *payload = memory;
+    uint32_t *order = (uint32_t *)(payload + payload_room(shape, count));
+    mospt_linear_input input = {.records = records,
+                                .colours = subtree->colours,
+                                .depth = shape->inner_depth,
+                                .index_bits = subtree->index_bits,
+                                .cell_shift = solved->cell_shift};
+    mospt_linear_build(&input, subtree->keys + solved->first, count, order + count, order,
+                       node->level_end);
+    mospt_payload_pack(shape->schema, records, order, count, payload, node);
+    return mospt_payload_points_hash(shape->schema, payload, payload + count * sizeof(mospt_vertex),
+                                     count);
 }

@@ -22,32 +22,53 @@ typedef struct {
     uint32_t add_threshold;
 } prep_shape;
 
-/* Nodes with their payloads, parents first, octants in their order. */
+/* A node, and the points that it keeps. */
 typedef struct {
-    mospt_node *nodes; /* [node_count], owned; payload_offset counts from `payload` */
+    mospt_node node;     /* corner, level, child_mask, count and payload_size; the rest is told by
+                            prep_solve_emit() */
+    uint32_t first;      /* of its keys in the subtree */
+    uint32_t cell_shift; /* of them, see mospt_linear_input */
+} prep_solved;
+
+/* Which point is in which node: nodes with their keys, parents first, octants in their order. */
+typedef struct {
+    prep_solved *nodes; /* [node_count], owned */
     uint32_t node_count, node_capacity;
-    uint8_t *payload; /* [point_count][mospt_record_size()], owned */
-    uint64_t point_count;
-    uint64_t points_hash; /* of the points as they stand in the payloads */
+    uint32_t count, index_bits;
+    uint64_t *keys;    /* [count], borrowed, in the caller's working memory: those of each node by
+                          rising cell */
+    uint32_t *colours; /* [count], likewise: of the records */
 } prep_subtree;
 
 void prep_subtree_fini(prep_subtree *subtree);
 
-/* Bytes that prep_solve() takes for each point: its result and its working memory, the caller's
- * records not counted. */
-size_t prep_solve_point_size(const prep_shape *shape);
+/* Bytes of working memory for `count` points, which the subtree goes on using; the records come on
+ * top. */
+size_t prep_solve_work_size(uint32_t count);
 
-/* Builds the subtree below a node.
- * records  [count][mospt_record_size()], all inside the node, in the order in which they arrived
+/* Divides points among the nodes of a subtree.
+ * records  `count` of them, all inside the node, in the order in which they arrived
+ * work     prep_solve_work_size(count) bytes, aligned for any type
  * out      released by prep_subtree_fini()
  * errors   MOSPT_ENOMEM, MOSPT_EINVAL (deeper than a file can say)
  * threads  any */
 bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
-                const uint8_t *records, uint32_t count, prep_subtree *out, mospt_err *err);
+                const mospt_records *records, uint32_t count, void *work, prep_subtree *out,
+                mospt_err *err);
 
 /* Makes one node of all the given points.
  * child_mask  octants that have a child; no two of the points in such an octant share a finest cell
  */
 bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
-                     uint8_t child_mask, const uint8_t *records, uint32_t count, prep_subtree *out,
-                     mospt_err *err);
+                     uint8_t child_mask, const mospt_records *records, uint32_t count, void *work,
+                     prep_subtree *out, mospt_err *err);
+
+/* Bytes of working memory for the payload of a node of `count` points. */
+size_t prep_solve_emit_size(const prep_shape *shape, uint32_t count);
+
+/* Makes the payload of a node, and completes what is said of the node.
+ * memory   prep_solve_emit_size() bytes, aligned for any type; the payload is where it begins
+ * returns  the sum of the hashes of the points as they stand in the payload
+ * threads  any, each node once */
+uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
+                         prep_subtree *subtree, uint32_t node, void *memory);

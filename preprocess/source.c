@@ -42,13 +42,14 @@ bool prep_source_open(const prep_folder_list *list, const prep_scan_options *opt
                       const char *scratch, prep_source *out, mospt_err *err)
 {
     prep_source s = {.spool_fd = -1, .options = *options, .spool_folder = strdup(scratch)};
-    bool ok = s.spool_folder != NULL || mospt_err_nomem(err, strlen(scratch));
+    bool ok = prep_scan_memory_create(&s.options.memory, err) &&
+              (s.spool_folder != NULL || mospt_err_nomem(err, strlen(scratch)));
     for (size_t f = 0; ok && f < list->count; f++) {
         uint32_t scans = 1;
         for (uint32_t i = 0; ok && i < scans; i++) {
             prep_scan *scan = NULL;
             mospt_err why = {0};
-            if (prep_scan_open(list->files[f].path, i, options, &scan, &why)) {
+            if (prep_scan_open(list->files[f].path, i, &s.options, &scan, &why)) {
                 const prep_scan_info *info = prep_scan_describe(scan);
                 scans = info->scan_count;
                 ok = add_scan(&s, &list->files[f], i, info, err);
@@ -75,6 +76,7 @@ void prep_source_close(prep_source *s)
     for (uint32_t i = 0; i < s->left_out_count; i++)
         free(s->left_out[i].name);
     if (s->spool_fd >= 0) close(s->spool_fd);
+    prep_scan_memory_destroy(s->options.memory);
     free(s->scans), free(s->left_out), free(s->spool_folder);
     *s = (prep_source){.spool_fd = -1};
 }
@@ -193,7 +195,7 @@ bool prep_source_measure(prep_source *s, bool all, prep_source_report report, vo
 /* A slot is filled by the reading thread, handed over, used, and handed back. */
 typedef struct {
     prep_batch batch;
-    uint32_t scan, made_for; /* made_for: scan whose attributes the batch was made for */
+    uint32_t scan;
     bool made;
 } slot;
 
@@ -219,11 +221,10 @@ static bool prepare(prep_stream *st, slot *to, uint32_t scan, mospt_err *err)
 {
     to->scan = scan;
     to->batch.count = 0;
-    if (to->made && to->made_for == scan) return true;
+    const mospt_schema *attributes = &st->source->scans[scan].info.attributes;
+    if (to->made && prep_batch_suits(&to->batch, attributes)) return true;
     if (to->made) prep_batch_fini(&to->batch);
-    to->made =
-        prep_batch_init(&to->batch, &st->source->scans[scan].info.attributes, st->capacity, err);
-    to->made_for = scan;
+    to->made = prep_batch_init(&to->batch, attributes, st->capacity, err);
     return to->made;
 }
 

@@ -31,9 +31,9 @@ typedef struct {
     prep_left_out *left_out; /* [left_out_count], owned */
     uint32_t left_out_count;
 
-    prep_scan_options options;
-    int spool_fd;       /* -1: nothing spooled */
-    char *spool_folder; /* owned */
+    prep_scan_options options; /* its memory is owned */
+    int spool_fd;              /* -1: nothing spooled */
+    char *spool_folder;        /* owned */
     uint64_t spool_size;
 } prep_source;
 

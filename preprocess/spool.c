@@ -8,21 +8,74 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
+
+/* Memory for blocks comes from the system in slabs of so many bytes, of which only what is touched
+ * counts. */
+enum { SLAB_SIZE = 64 << 20, RECORDS_MIN_SHIFT = 4 };
+
+typedef struct slab {
+    struct slab *next;
+    size_t size;
+} slab;
 
 struct prep_store {
     size_t record_size, block_size;
-    uint32_t block_capacity; /* records */
-    char *folder;            /* owned */
-    int fd;                  /* of the scratch file, -1 before the first block goes there */
+    uint32_t block_shift; /* log2 of its records */
+    char *folder;         /* owned */
+    int fd;               /* of the scratch file, -1 before the first block goes there */
 
     pthread_mutex_t lock;
     /* Under the lock: */
     size_t full_in_memory, full_limit; /* sealed blocks in memory, and how many may be */
     uint64_t *free_slots;              /* [free_count], owned */
     size_t free_count, free_capacity;
-    uint64_t slot_count; /* the scratch file is so many blocks long */
+    uint64_t slot_count;        /* the scratch file is so many blocks long */
+    slab *slabs;                /* owned */
+    uint8_t *fresh, *fresh_end; /* of the newest slab */
+    uint8_t *free_blocks;       /* each begins with a pointer to the next */
 };
+
+/* Memory of a block; the one that was given back last, which is the warmest, comes first. NULL:
+ * none is left. */
+static uint8_t *take_memory(prep_store *s)
+{
+    pthread_mutex_lock(&s->lock);
+    uint8_t *memory = s->free_blocks;
+    if (memory != NULL) {
+        memcpy(&s->free_blocks, memory, sizeof s->free_blocks);
+    } else {
+        if ((size_t)(s->fresh_end - s->fresh) < s->block_size) {
+            size_t size = sizeof(mospt_vertex) + s->block_size;
+            if (size < SLAB_SIZE) size = SLAB_SIZE;
+            void *fresh = mmap(NULL, size, PROT_READ | PROT_WRITE,
+                               MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+            if (fresh != MAP_FAILED) {
+                madvise(fresh, size, MADV_HUGEPAGE); /* only faster, a refusal does not matter */
+                *(slab *)fresh = (slab){.next = s->slabs, .size = size};
+                s->slabs = fresh;
+                s->fresh = (uint8_t *)fresh + sizeof(mospt_vertex);
+                s->fresh_end = (uint8_t *)fresh + size;
+            }
+        }
+        if ((size_t)(s->fresh_end - s->fresh) >= s->block_size) {
+            memory = s->fresh;
+            s->fresh += s->block_size;
+        }
+    }
+    pthread_mutex_unlock(&s->lock);
+    return memory;
+}
+
+static void give_memory(prep_store *s, uint8_t *memory)
+{
+    if (memory == NULL) return;
+    pthread_mutex_lock(&s->lock);
+    memcpy(memory, &s->free_blocks, sizeof s->free_blocks);
+    s->free_blocks = memory;
+    pthread_mutex_unlock(&s->lock);
+}
 
 bool prep_store_create(const char *folder, size_t record_size, size_t block_size,
                        size_t memory_size, prep_store **out, mospt_err *err)
@@ -34,9 +87,10 @@ bool prep_store_create(const char *folder, size_t record_size, size_t block_size
         return mospt_err_nomem(err, sizeof *s);
     }
     s->record_size = record_size;
-    s->block_capacity = (uint32_t)(block_size / record_size);
-    if (s->block_capacity < 16) s->block_capacity = 16;
-    s->block_size = s->block_capacity * record_size;
+    s->block_shift = RECORDS_MIN_SHIFT;
+    while (record_size << (s->block_shift + 1) <= block_size)
+        s->block_shift++;
+    s->block_size = record_size << s->block_shift;
     s->full_limit = memory_size / s->block_size;
     s->fd = -1;
     pthread_mutex_init(&s->lock, NULL);
@@ -48,6 +102,11 @@ void prep_store_destroy(prep_store *s)
 {
     if (s == NULL) return;
     if (s->fd >= 0) close(s->fd);
+    while (s->slabs != NULL) {
+        slab *next = s->slabs->next;
+        munmap(s->slabs, s->slabs->size);
+        s->slabs = next;
+    }
     pthread_mutex_destroy(&s->lock);
     free(s->free_slots);
     free(s->folder);
@@ -59,9 +118,14 @@ uint64_t prep_store_scratch_peak(const prep_store *store)
     return store->slot_count * store->block_size;
 }
 
-uint32_t prep_store_block_capacity(const prep_store *store)
+uint32_t prep_store_block_shift(const prep_store *store)
 {
-    return store->block_capacity;
+    return store->block_shift;
+}
+
+size_t prep_store_block_size(const prep_store *store)
+{
+    return store->block_size;
 }
 
 /* Under the lock. The file has no name, so that it goes with the process, however that ends. */
@@ -113,77 +177,50 @@ static bool may_stay(prep_store *s)
     return stays;
 }
 
-/* `*reuse` gets the memory of the block if that went to the disk. */
-static bool seal_last(prep_store *s, prep_spool *spool, uint8_t **reuse, mospt_err *err)
+/* Ends the filling of the last block. */
+static bool seal_last(prep_store *s, prep_spool *spool, mospt_err *err)
 {
     prep_block *block = &spool->blocks[spool->block_count - 1];
-    *reuse = NULL;
-    spool->open = false;
-    if (may_stay(s)) {
-        if (block->count < s->block_capacity) {
-            uint8_t *smaller = realloc(block->memory, block->count * s->record_size);
-            if (smaller != NULL) block->memory = smaller;
-        }
-        return true;
-    }
-    if (!take_slot(s, &block->slot, err) ||
-        !mospt_file_write_at(s->fd, s->folder, block->slot * s->block_size, block->memory,
-                             block->count * s->record_size, err)) {
-        free(block->memory);
-        block->memory = NULL;
-        block->count = 0;
-        return false;
-    }
-    *reuse = block->memory;
+    block->count =
+        (uint32_t)(spool->count - ((uint64_t)(spool->block_count - 1) << s->block_shift));
+    spool->next = spool->end = NULL;
+    if (may_stay(s)) return true;
+    bool ok = take_slot(s, &block->slot, err) &&
+              mospt_file_write_at(s->fd, s->folder, block->slot * s->block_size, block->memory,
+                                  block->count * s->record_size, err);
+    if (!ok) spool->count -= block->count, block->count = 0;
+    give_memory(s, block->memory);
     block->memory = NULL;
-    return true;
+    return ok;
 }
 
-static bool add_block(prep_store *s, prep_spool *spool, uint8_t *memory, mospt_err *err)
+bool prep_spool_grow(prep_store *s, prep_spool *spool, mospt_err *err)
 {
+    if (spool->next != NULL && !seal_last(s, spool, err)) return false;
     if (spool->block_count == spool->capacity) {
         uint32_t capacity = spool->capacity > 0 ? 2 * spool->capacity : 4;
         prep_block *blocks = realloc(spool->blocks, capacity * sizeof *blocks);
-        if (blocks == NULL) {
-            free(memory);
-            return mospt_err_nomem(err, capacity * sizeof *blocks);
-        }
+        if (blocks == NULL) return mospt_err_nomem(err, capacity * sizeof *blocks);
         spool->blocks = blocks;
         spool->capacity = capacity;
     }
-    if (memory == NULL) memory = malloc(s->block_size);
+    uint8_t *memory = take_memory(s);
     if (memory == NULL) return mospt_err_nomem(err, s->block_size);
     spool->blocks[spool->block_count++] = (prep_block){.memory = memory};
-    spool->open = true;
-    return true;
-}
-
-bool prep_spool_append(prep_store *s, prep_spool *spool, const uint8_t *record, mospt_err *err)
-{
-    if (!spool->open || spool->blocks[spool->block_count - 1].count == s->block_capacity) {
-        uint8_t *memory = NULL;
-        if (spool->open && !seal_last(s, spool, &memory, err)) return false;
-        if (!add_block(s, spool, memory, err)) return false;
-    }
-    prep_block *last = &spool->blocks[spool->block_count - 1];
-    memcpy(last->memory + last->count * s->record_size, record, s->record_size);
-    last->count++;
-    spool->count++;
+    spool->next = memory;
+    spool->end = memory + s->block_size;
     return true;
 }
 
 bool prep_spool_seal(prep_store *s, prep_spool *spool, mospt_err *err)
 {
-    uint8_t *memory = NULL;
-    bool ok = !spool->open || seal_last(s, spool, &memory, err);
-    free(memory);
-    return ok;
+    return spool->next == NULL || seal_last(s, spool, err);
 }
 
 static void release(prep_store *s, prep_block *block, bool sealed)
 {
     if (block->memory != NULL) {
-        free(block->memory);
+        give_memory(s, block->memory);
         block->memory = NULL;
         if (sealed) {
             pthread_mutex_lock(&s->lock);
@@ -196,36 +233,60 @@ static void release(prep_store *s, prep_block *block, bool sealed)
     block->count = 0;
 }
 
+static bool read_block(const prep_store *s, const prep_block *block, uint8_t *out, mospt_err *err)
+{
+    return mospt_file_read_at(s->fd, s->folder, block->slot * s->block_size, out,
+                              block->count * s->record_size, err);
+}
+
+size_t prep_spool_size_on_disk(const prep_store *s, const prep_spool *spool)
+{
+    size_t sum = 0;
+    for (uint32_t i = 0; i < spool->block_count; i++)
+        if (spool->blocks[i].memory == NULL) sum += s->block_size;
+    return sum;
+}
+
+bool prep_spool_view(prep_store *s, const prep_spool *spool, uint8_t *buffer,
+                     const uint8_t **blocks, mospt_err *err)
+{
+    for (uint32_t i = 0; i < spool->block_count; i++) {
+        blocks[i] = spool->blocks[i].memory;
+        if (blocks[i] != NULL) continue;
+        if (!read_block(s, &spool->blocks[i], buffer, err)) return false;
+        blocks[i] = buffer;
+        buffer += s->block_size;
+    }
+    return true;
+}
+
 bool prep_spool_take_block(prep_store *s, prep_spool *spool, uint32_t i, uint8_t *out,
                            uint32_t *count, mospt_err *err)
 {
     prep_block *block = &spool->blocks[i];
-    size_t size = block->count * s->record_size;
-    bool last = i + 1 == spool->block_count;
     *count = block->count;
-    if (block->memory != NULL) memcpy(out, block->memory, size);
-    else if (!mospt_file_read_at(s->fd, s->folder, block->slot * s->block_size, out, size, err))
-        return false;
-    spool->count -= block->count;
-    release(s, block, !(last && spool->open));
-    if (last) prep_spool_drop(s, spool);
+    if (block->memory != NULL) memcpy(out, block->memory, block->count * s->record_size);
+    else if (!read_block(s, block, out, err)) return false;
+    release(s, block, true);
     return true;
 }
 
 bool prep_spool_take(prep_store *s, prep_spool *spool, uint8_t *out, mospt_err *err)
 {
-    uint32_t block_count = spool->block_count, count;
-    for (uint32_t i = 0; i < block_count; i++) {
+    uint32_t count;
+    if (!prep_spool_seal(s, spool, err)) return false;
+    for (uint32_t i = 0; i < spool->block_count; i++) {
         if (!prep_spool_take_block(s, spool, i, out, &count, err)) return false;
         out += count * s->record_size;
     }
+    prep_spool_drop(s, spool);
     return true;
 }
 
 void prep_spool_drop(prep_store *s, prep_spool *spool)
 {
     for (uint32_t i = 0; i < spool->block_count; i++)
-        release(s, &spool->blocks[i], !(i + 1 == spool->block_count && spool->open));
+        release(s, &spool->blocks[i], !(i + 1 == spool->block_count && spool->next != NULL));
     free(spool->blocks);
     *spool = (prep_spool){0};
 }

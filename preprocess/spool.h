@@ -6,25 +6,29 @@
  * scratch file whose blocks are used again. */
 #pragma once
 #include "mospt/err.h"
+#include "mospt/point.h"
 
 typedef struct prep_store prep_store;
 
 typedef struct {
-    uint8_t *memory; /* owned by the store; NULL: the block is on the disk */
+    uint8_t *memory; /* of the store; NULL: the block is on the disk */
     uint64_t slot;   /* of the scratch file, if it is */
-    uint32_t count;  /* records */
+    uint32_t count;  /* records; 0: taken */
 } prep_block;
 
 typedef struct {
     prep_block *blocks; /* [block_count], owned; the last one, in memory, is being filled */
     uint32_t block_count, capacity;
-    bool open;      /* the last block still takes records */
-    uint64_t count; /* records */
-} prep_spool;       /* {0} is empty */
+    uint8_t *next, *end; /* room in the last block; NULL: it takes no more */
+    uint64_t count;      /* records */
+} prep_spool;            /* {0} is empty */
 
-/* folder         where the scratch file is made; it has no name there, so nothing is left behind by
- * a killed process block_size     bytes memory_size    bytes of full blocks that stay in memory;
- * the blocks that are being filled come on top */
+/* folder       where the scratch file is made; it has no name there, so nothing is left behind by a
+ *              killed process
+ * record_size  bytes, at least those of a vertex
+ * block_size   bytes, at most; a block holds a power of two of records, and at least 16
+ * memory_size  bytes of full blocks that stay in memory; the blocks that are being filled come on
+ *              top */
 bool prep_store_create(const char *folder, size_t record_size, size_t block_size,
                        size_t memory_size, prep_store **out, mospt_err *err);
 void prep_store_destroy(prep_store *store);
@@ -32,21 +36,48 @@ void prep_store_destroy(prep_store *store);
 /* Most bytes of the scratch file that were in use at a time. */
 uint64_t prep_store_scratch_peak(const prep_store *store);
 
-/* Records that fit a block. */
-uint32_t prep_store_block_capacity(const prep_store *store);
+/* log2 of the records that fit a block. */
+uint32_t prep_store_block_shift(const prep_store *store);
 
-/* Appends one record. threads: one per spool at a time, any number of spools */
-bool prep_spool_append(prep_store *store, prep_spool *spool, const uint8_t *record, mospt_err *err);
+/* Bytes of a block. */
+size_t prep_store_block_size(const prep_store *store);
+
+/* Makes room in a spool whose last block is full. Use prep_spool_append(). */
+bool prep_spool_grow(prep_store *store, prep_spool *spool, mospt_err *err);
+
+/* Appends one record.
+ * record_size  of the store
+ * threads      one per spool at a time, any number of spools */
+static inline bool prep_spool_append(prep_store *store, prep_spool *spool, const uint8_t *record,
+                                     size_t record_size, mospt_err *err)
+{
+    if (spool->next == spool->end && !prep_spool_grow(store, spool, err)) return false;
+    mospt_record_copy(spool->next, record, record_size);
+    spool->next += record_size;
+    spool->count++;
+    return true;
+}
 
 /* Ends the filling: the last block takes part in the sharing of memory like all others. */
 bool prep_spool_seal(prep_store *store, prep_spool *spool, mospt_err *err);
+
+/* Bytes that prep_spool_view() reads from the disk into memory. */
+size_t prep_spool_size_on_disk(const prep_store *store, const prep_spool *spool);
+
+/* Makes all records of a sealed spool addressable, as they stand in its blocks.
+ * buffer   [prep_spool_size_on_disk()]
+ * blocks   out, [spool->block_count]: for mospt_records, with prep_store_block_shift(); valid until
+ *          the spool is dropped */
+bool prep_spool_view(prep_store *store, const prep_spool *spool, uint8_t *buffer,
+                     const uint8_t **blocks, mospt_err *err);
 
 /* Copies all records to `out`, [spool->count][record_size], in their order, and empties the spool.
  */
 bool prep_spool_take(prep_store *store, prep_spool *spool, uint8_t *out, mospt_err *err);
 
-/* Copies the records of one block to `out`, [block capacity][record_size], and frees it. Blocks are
- * taken in rising order; the spool is empty after the last one. */
+/* Copies the records of one block of a sealed spool to `out`, [2^block_shift][record_size], and
+ * frees it. Drop the spool when all are taken.
+ * threads  any, each block by one */
 bool prep_spool_take_block(prep_store *store, prep_spool *spool, uint32_t block, uint8_t *out,
                            uint32_t *count, mospt_err *err);
 

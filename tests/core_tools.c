@@ -242,24 +242,83 @@ void core_metadata_make(const core_site *site, uint32_t add_threshold, mospt_met
             memcpy(out->sources[i].high, out->high, sizeof out->high);
 }
 
+static core_subtree solve(const prep_shape *shape, const core_site *site, bool node)
+{
+    mospt_err err = {0};
+    prep_subtree solved = {0};
+    const uint8_t *blocks[] = {site->records};
+    const mospt_records records = {
+        .blocks = blocks, .stride = site->stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
+    void *work = malloc(prep_solve_work_size(site->count)),
+         *memory = malloc(prep_solve_emit_size(shape, site->count));
+    core_subtree made = {.payload = malloc(site->count * site->stride)};
+    assert_true(work != NULL && memory != NULL && made.payload != NULL);
+    if (node)
+        CORE_NEED(prep_solve_node(shape, site->grid.root, 0, 0, &records, site->count, work,
+                                  &solved, &err));
+    else
+        CORE_NEED(
+            prep_solve(shape, site->grid.root, 0, &records, site->count, work, &solved, &err));
+    made.nodes = malloc(solved.node_count * sizeof *made.nodes);
+    assert_non_null(made.nodes);
+    for (uint32_t n = 0; n < solved.node_count; n++) {
+        uint32_t count = solved.nodes[n].node.count;
+        assert_int_equal(solved.nodes[n].node.payload_size, count * site->stride);
+        made.points_hash += prep_solve_emit(shape, &records, &solved, n, memory);
+        memcpy(made.payload + made.point_count * site->stride, memory, count * site->stride);
+        made.point_count += count;
+        made.nodes[made.node_count++] = solved.nodes[n].node;
+    }
+    prep_subtree_fini(&solved);
+    free(work), free(memory);
+    return made;
+}
+
+core_subtree core_solve(const prep_shape *shape, const core_site *site)
+{
+    return solve(shape, site, false);
+}
+
+core_subtree core_solve_node(const prep_shape *shape, const core_site *site)
+{
+    return solve(shape, site, true);
+}
+
+void core_subtree_fini(core_subtree *subtree)
+{
+    free(subtree->nodes), free(subtree->payload);
+    *subtree = (core_subtree){0};
+}
+
+void core_write(mospt_writer *writer, core_subtree *made)
+{
+    mospt_err err = {0};
+    const uint8_t *payload = made->payload;
+    for (uint32_t i = 0; i < made->node_count; i++) {
+        const uint64_t size = made->nodes[i].payload_size;
+        uint32_t index;
+        CORE_NEED(mospt_writer_place(writer, &made->nodes[i], &index, &err));
+        CORE_NEED(mospt_writer_write(writer, &made->nodes[i], payload, &err));
+        mospt_writer_complete(writer, index, &made->nodes[i]);
+        payload += size;
+    }
+}
+
 void core_dataset_make(const core_site *site, uint32_t inner_depth, uint32_t add_threshold,
                        const char *path)
 {
     prep_shape shape = core_shape(site, inner_depth, add_threshold);
-    prep_subtree made = {0};
+    core_subtree made = core_solve(&shape, site);
     mospt_writer *writer = NULL;
     mospt_metadata metadata;
     mospt_err err = {0};
-    CORE_NEED(prep_solve(&shape, site->grid.root, 0, site->records, site->count, &made, &err));
     CORE_NEED(mospt_writer_create(path, inner_depth, &writer, &err));
-    for (uint32_t i = 0; i < made.node_count; i++)
-        CORE_NEED(mospt_writer_append(writer, &made.nodes[i],
-                                      made.payload + made.nodes[i].payload_offset, &err));
+    core_write(writer, &made);
     core_metadata_make(site, add_threshold, &metadata);
     CORE_NEED(mospt_writer_commit(writer, &metadata, &err));
     mospt_metadata_fini(&metadata);
     mospt_writer_destroy(writer);
-    prep_subtree_fini(&made);
+    core_subtree_fini(&made);
 }
 
 static void remember_first(void *context, const mospt_err *what)

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "mospt/check.h"
-#include "mospt/dataset.h"
+#include "mospt/writer.h"
 #include "preprocess/solve.h"
 
 /* Fails the test with the words of the error. */
@@ -63,6 +63,22 @@ typedef struct {
 
 void core_site_make(core_kind kind, uint32_t bits, uint32_t count, uint64_t seed, core_site *out);
 void core_site_fini(core_site *site);
+/* Nodes with their payloads, one after the other. */
+typedef struct {
+    mospt_node *nodes; /* [node_count] */
+    uint32_t node_count;
+    uint8_t *payload;
+    uint64_t point_count, points_hash;
+} core_subtree;
+
+/* The subtree of all points of a site, or one node of them. Released by core_subtree_fini(). */
+core_subtree core_solve(const prep_shape *shape, const core_site *site);
+core_subtree core_solve_node(const prep_shape *shape, const core_site *site);
+void core_subtree_fini(core_subtree *subtree);
+
+/* Gives all nodes of a subtree their places, and writes their payloads. */
+void core_write(mospt_writer *writer, core_subtree *made);
+
 prep_shape core_shape(const core_site *site, uint32_t inner_depth, uint32_t add_threshold);
 
 /* Metadata that says the truth about a site, but for what the writer fills in. */

@@ -179,16 +179,16 @@ static uint64_t findings_of(const liar *l, mospt_err *first)
 {
     char *path = core_path(folder, "liar.ipts");
     prep_shape shape = core_shape(&site, DEPTH, THRESHOLD);
-    prep_subtree made = {0};
+    core_subtree made = core_solve(&shape, &site);
     mospt_writer *writer = NULL;
     mospt_metadata metadata;
     mospt_err err = {0};
     uint64_t findings = 0;
-    CORE_NEED(prep_solve(&shape, site.grid.root, 0, site.records, site.count, &made, &err));
     CORE_NEED(mospt_writer_create(path, DEPTH, &writer, &err));
+    uint8_t *payload = made.payload;
     for (uint32_t i = 0; i < made.node_count; i++) {
         mospt_node *n = &made.nodes[i];
-        uint8_t *payload = made.payload + n->payload_offset;
+        const uint64_t size = n->payload_size; /* of what stands here, whatever is told of it */
         if (l->payload != NULL) {
             l->payload(payload, n, i);
             n->vertices_hash = mospt_hash(payload, n->count * sizeof(mospt_vertex));
@@ -196,8 +196,9 @@ static uint64_t findings_of(const liar *l, mospt_err *first)
                                             n->count * (size_t)site.schema.row_size);
         }
         if (l->node != NULL) l->node(n, i);
-        CORE_NEED(mospt_writer_append(writer, n, payload, &err));
+        payload += size;
     }
+    core_write(writer, &made);
     core_metadata_make(&site, THRESHOLD, &metadata);
     if (l->metadata != NULL) l->metadata(&metadata);
     bool committed = mospt_writer_commit(writer, &metadata, &err);
@@ -207,7 +208,7 @@ static uint64_t findings_of(const liar *l, mospt_err *first)
     if (committed) findings = core_findings(path, first);
     if (committed) core_folder_remove(path);
     else free(path);
-    prep_subtree_fini(&made);
+    core_subtree_fini(&made);
     return findings;
 }
 

@@ -16,13 +16,12 @@ static mospt_hierarchy good;
 static int set_up(void **state)
 {
     mospt_err err = {0};
-    prep_subtree made;
     (void)state;
     folder = core_folder_make();
     path = core_path(folder, "h.bin");
     core_site_make(CORE_CLUSTERED, 12, 3000, 8, &site);
     prep_shape shape = core_shape(&site, DEPTH, 20);
-    CORE_NEED(prep_solve(&shape, site.grid.root, 0, site.records, site.count, &made, &err));
+    core_subtree made = core_solve(&shape, &site);
     good = (mospt_hierarchy){.nodes = malloc(made.node_count * sizeof(mospt_node)),
                              .count = made.node_count,
                              .inner_depth = DEPTH,
@@ -32,7 +31,7 @@ static int set_up(void **state)
     CORE_NEED(mospt_hierarchy_link(&good, &site.grid, &err));
     assert_true(good.count > 20 && good.nodes[good.count - 1].level > 2);
     assert_int_equal(good.point_count, site.count);
-    prep_subtree_fini(&made);
+    core_subtree_fini(&made);
     return 0;
 }
 

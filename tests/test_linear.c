@@ -13,26 +13,33 @@ typedef struct {
     uint32_t level_end[MOSPT_LEVELS_MAX];
 } built;
 
+enum { INDEX_BITS = 16, CODE_LEVELS = 16 }; /* of a key */
+
 /* code_levels   of the codes: `depth` of them or more */
 static built build(const core_site *site, uint32_t depth, uint32_t code_levels)
 {
     uint32_t n = site->count;
     built b = {.order = malloc((n + 1) * sizeof *b.order)};
-    mospt_linear_key *keys = malloc(2 * (n + 1) * sizeof *keys);
+    uint64_t *keys = malloc(2 * (n + 1) * sizeof *keys);
     void *work = malloc(mospt_linear_work_size(n) + 1);
-    mospt_linear_input input = {.records = site->records,
-                                .stride = site->stride,
-                                .depth = depth,
-                                .code_shift = 3 * (code_levels - depth)};
-    assert_true(b.order != NULL && keys != NULL && work != NULL);
+    const uint8_t *blocks[] = {site->records};
+    const mospt_records records = {
+        .blocks = blocks, .stride = site->stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
+    uint32_t *colours = malloc((n + 1) * sizeof *colours);
+    const mospt_linear_input input = {.records = &records,
+                                      .colours = colours,
+                                      .depth = depth,
+                                      .index_bits = INDEX_BITS,
+                                      .cell_shift = INDEX_BITS + 3 * (code_levels - depth)};
+    assert_true(b.order != NULL && keys != NULL && work != NULL && colours != NULL);
     for (uint32_t i = 0; i < n; i++) {
         mospt_vertex v = mospt_vertex_of(site->records + i * site->stride);
-        keys[i] =
-            (mospt_linear_key){mospt_cell_code(v.x, v.y, v.z, site->grid.bits, code_levels), i};
+        keys[i] = mospt_cell_code(v.x, v.y, v.z, site->grid.bits, code_levels) << INDEX_BITS | i;
+        memcpy(&colours[i], &v.r, sizeof colours[i]);
     }
-    prep_sort_keys(keys, keys + n, n);
+    prep_sort_keys(keys, keys + n, n, INDEX_BITS);
     mospt_linear_build(&input, keys, n, work, b.order, b.level_end);
-    free(keys), free(work);
+    free(keys), free(work), free(colours);
     return b;
 }
 
@@ -45,7 +52,7 @@ static void assert_like_twin(const core_site *site, uint32_t depth)
     for (uint32_t i = 0; i < site->count; i++)
         assert_true(ref_mospt_insert(m, site->records + i * site->stride, false));
     ref_mospt_finish(m, order, level_end);
-    const uint32_t code_levels[] = {depth, depth + 3, MOSPT_CODE_LEVELS};
+    const uint32_t code_levels[] = {depth, depth + 3, CODE_LEVELS};
     for (int k = 0; k < 3; k++) {
         built b = build(site, depth, code_levels[k]);
         assert_memory_equal(b.level_end, level_end, (depth + 2) * sizeof level_end[0]);

@@ -65,6 +65,7 @@ static mospt_metadata make(const char *name)
         s->points = i * 1000, s->has_rgb = i & 1, s->has_intensity = !(i & 1);
         s->low[i] = -i / 3.0, s->high[i] = 1e9 / 7;
         if (i == 1) {
+            s->crs = strdup("PROJCS[\"elsewhere\", ...]");
             s->damage = strdup("scan_07.las: byte 18234: \x01 record claims\t26 bytes");
             s->has_pose = true;
             for (int k = 0; k < 16; k++)
@@ -121,6 +122,8 @@ static void assert_same(const mospt_metadata *a, const mospt_metadata *b, const 
         }
         assert_true(s->has_rgb == t->has_rgb && s->has_intensity == t->has_intensity &&
                     s->has_pose == t->has_pose);
+        assert_true((s->crs == NULL) == (t->crs == NULL));
+        if (s->crs != NULL) assert_string_equal(s->crs, t->crs);
         assert_true((s->damage == NULL) == (t->damage == NULL));
         if (s->damage != NULL) assert_string_equal(s->damage, t->damage);
         assert_memory_equal(s->pose, t->pose, sizeof s->pose);

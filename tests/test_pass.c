@@ -3,7 +3,7 @@
 #include "tests/core_tools.h"
 
 #include "mospt/writer.h"
-#include "preprocess/pass.h"
+#include "preprocess/finish.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,6 +23,21 @@ static bool go_on(void *context, const prep_written *written)
     return left == NULL || (*left)-- > 0;
 }
 
+/* Records [begin, begin + count) of a site as a batch. */
+typedef struct {
+    const core_site *site;
+    uint32_t begin, count;
+} feed;
+
+static uint32_t feed_slice(void *context, uint32_t slice, uint8_t *records)
+{
+    const feed *f = context;
+    uint32_t begin = slice * PREP_PASS_SLICE, left = f->count - begin;
+    uint32_t n = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
+    memcpy(records, f->site->records + (f->begin + begin) * f->site->stride, n * f->site->stride);
+    return n;
+}
+
 /* Builds the site; `reports_left` NULL: until the end. */
 static bool pass_build(const core_site *site, const prep_shape *shape, const way *w,
                        const char *path, const char *scratch, uint32_t *reports_left,
@@ -38,21 +53,25 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     assert_true(
         prep_store_create(scratch, site->stride, w->block_size, w->store_memory, &store, err));
     assert_true(mospt_writer_create(path, shape->inner_depth, &writer, err));
-    uint32_t block = prep_store_block_capacity(store);
+    prep_arena *arena = NULL;
+    assert_true(prep_arena_create(w->solve_memory, &arena, err));
     prep_pass_env env = {.shape = shape,
                          .workers = workers,
                          .store = store,
                          .writer = writer,
                          .levels = w->levels,
-                         .batch_count = w->batch > block ? w->batch : block,
-                         .solve_memory = w->solve_memory,
+                         .arena = arena,
+                         .batch_slices = (w->batch + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE,
+                         .solve_points = w->solve_memory / prep_finish_size(site->stride, 1),
                          .written = &written,
                          .report = go_on,
                          .report_context = reports_left};
     bool ok = prep_pass_begin(&env, site->grid.root, 0, &pass, err);
     for (uint32_t i = 0; ok && i < site->count; i += w->batch) {
-        uint32_t n = site->count - i < w->batch ? site->count - i : w->batch;
-        ok = prep_pass_insert(pass, site->records + i * site->stride, n, err);
+        uint32_t left = site->count - i;
+        feed f = {site, i, left < w->batch ? left : w->batch};
+        ok = prep_pass_insert(pass, (f.count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE, feed_slice,
+                              &f, err);
     }
     if (ok) ok = prep_pass_end(pass, err);
     else prep_pass_abandon(pass);
@@ -65,6 +84,7 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     }
     mospt_writer_destroy(writer);
     prep_store_destroy(store);
+    prep_arena_destroy(arena);
     prep_workers_destroy(workers);
     return ok;
 }
@@ -110,7 +130,7 @@ static void check_all_ways(const core_site *site, uint32_t depth, uint32_t thres
 {
     static const size_t store[] = {0, 3000, 60000, 1 << 30}, solve[] = {0, 20000, 300000, 1 << 30};
     static const uint32_t threads[] = {1, 2, 7}, batch[] = {1000, 20000, 333},
-                          block[] = {64, 700, 1 << 16};
+                          block[] = {64, 700, 1 << 14};
     for (uint32_t k = first; k < 4 * 4 * 3 * 3 * 3 * 3; k += stride) {
         uint32_t n = k;
         way w = {0};
@@ -187,7 +207,7 @@ static void piles_give_the_same_bytes(void **state)
         core_site site;
         core_site_make(CORE_ONE_POSITION, 1, PREP_PILE_MAX + more[k], 1, &site);
         const way ways[] = {
-            {.levels = 3, .threads = 2, .batch = 65536, .block_size = 1 << 16},
+            {.levels = 3, .threads = 2, .batch = 65536, .block_size = 1 << 14},
             {.levels = 1,
              .threads = 1,
              .batch = 50000,

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { SHIFT = 3 };
+
 static void check(const mospt_schema *schema, uint32_t record_count, uint32_t count)
 {
     size_t stride = mospt_record_size(schema);
@@ -15,8 +17,10 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
     uint8_t *records = malloc(record_count * stride + 1), *out = malloc(count * stride + 1),
             *picked = malloc(count * stride + 1);
     uint32_t *order = malloc((count + 1) * sizeof *order);
+    const uint8_t **blocks = malloc(((record_count >> SHIFT) + 1) * sizeof *blocks);
     mospt_node node = {.level = 3};
-    assert_true(records != NULL && out != NULL && order != NULL && picked != NULL);
+    assert_true(records != NULL && blocks != NULL && out != NULL && order != NULL &&
+                picked != NULL);
     for (size_t i = 0; i < record_count * stride; i++)
         records[i] = (uint8_t)core_random(&random);
     for (uint32_t i = 0; i < count; i++) {
@@ -24,7 +28,10 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
         memcpy(picked + i * stride, records + order[i] * stride, stride);
     }
     out[count * stride] = 0xa5;
-    mospt_payload_pack(schema, records, order, count, out, &node);
+    /* Whole blocks of 2^SHIFT, as a spool has them. */
+    for (uint32_t b = 0; b <= record_count >> SHIFT; b++)
+        blocks[b] = records + ((size_t)b << SHIFT) * stride;
+    mospt_payload_pack(schema, &(mospt_records){blocks, stride, SHIFT}, order, count, out, &node);
     assert_int_equal(out[count * stride], 0xa5);
     assert_int_equal(node.count, count);
     assert_int_equal(node.level, 3);
@@ -43,7 +50,7 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
     assert_true(node.attributes_hash == mospt_hash(planes, count * (size_t)schema->row_size));
     assert_true(mospt_payload_points_hash(schema, out, planes, count) ==
                 mospt_hash_records(picked, stride, count));
-    free(records), free(out), free(order), free(picked);
+    free(records), free(out), free(order), free(picked), free(blocks);
 }
 
 static void planes_hold_what_records_held(void **state)

@@ -1,7 +1,7 @@
 /* The division of memory: never more than was given, and always enough of each part to work. */
 #include "tests/core_tools.h"
 
-#include "preprocess/pass.h"
+#include "preprocess/finish.h"
 #include "preprocess/plan.h"
 
 #include <stdio.h>
@@ -15,10 +15,12 @@ static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, 
     assert_in_range(p->levels, 1, PREP_PASS_LEVELS_MAX);
     assert_true(p->levels <= depth);
     assert_true(3 * (p->levels + depth - 1) <= 32); /* codes of a pass are 32 bits */
-    assert_true(p->batch_count > 0 && p->block_size > 0 && p->solve_memory > 0);
+    assert_true(p->batch_slices > 0 && p->block_size > 0 && p->solve_memory > 0);
+    assert_true(p->solve_points * prep_finish_size(record_size, 1) <= p->solve_memory);
     uint64_t sum = prep_pass_cells_size(p->levels, depth) +
                    buckets * (p->levels + 1) * p->block_size +
-                   (uint64_t)p->batch_count * 2 * record_size + p->solve_memory + p->store_memory;
+                   (uint64_t)p->batch_slices * PREP_PASS_SLICE * 2 * record_size + p->solve_memory +
+                   p->store_memory;
     assert_true(sum <= memory);
 }
 
@@ -80,16 +82,16 @@ static void too_little_memory_is_refused_with_an_amount_that_would_do(void **sta
         }
 }
 
-static void a_block_of_a_spool_fits_a_batch(void **state)
+static void a_block_of_a_spool_fits_a_slice(void **state)
 {
-    /* finish_large() fills batches with whole blocks. */
+    /* finish_large() fills slices with whole blocks. */
     (void)state;
     for (uint64_t memory = 64 * MIB; memory <= 64 * 1024 * MIB; memory *= 2)
         for (uint32_t depth = 1; depth <= MOSPT_DEPTH_MAX; depth++)
             for (size_t record = 16; record < 400; record += 13) {
                 prep_plan plan;
                 if (prep_plan_make(memory, record, depth, &plan, NULL))
-                    assert_true(plan.block_size / record <= 65536);
+                    assert_true(plan.block_size / record <= PREP_PASS_SLICE);
             }
 }
 
@@ -105,7 +107,7 @@ int main(void)
         cmocka_unit_test(parts_never_sum_to_more_than_was_given),
         cmocka_unit_test(the_least_memory_is_enough_for_usual_points),
         cmocka_unit_test(too_little_memory_is_refused_with_an_amount_that_would_do),
-        cmocka_unit_test(a_block_of_a_spool_fits_a_batch),
+        cmocka_unit_test(a_block_of_a_spool_fits_a_slice),
         cmocka_unit_test(the_machine_has_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -19,11 +19,9 @@ static void unpack(const uint8_t *payload, uint32_t count, uint32_t i, uint8_t *
 static void assert_like_twin(const core_site *site, uint32_t depth, uint32_t threshold)
 {
     prep_shape shape = core_shape(site, depth, threshold);
-    prep_subtree made;
+    core_subtree made = core_solve(&shape, site);
     ref_tree tree;
-    mospt_err err = {0};
     uint64_t at = 0;
-    CORE_NEED(prep_solve(&shape, site->grid.root, 0, site->records, site->count, &made, &err));
     ref_tree_build(&shape, site, &tree);
     assert_int_equal(made.node_count, tree.count);
     assert_int_equal(made.point_count, site->count);
@@ -37,9 +35,8 @@ static void assert_like_twin(const core_site *site, uint32_t depth, uint32_t thr
         assert_int_equal(node->count, want->count);
         assert_memory_equal(node->level_end, want->level_end,
                             (depth + 2) * sizeof want->level_end[0]);
-        assert_int_equal(node->payload_offset, at);
         assert_int_equal(node->payload_size, node->count * site->stride);
-        const uint8_t *payload = made.payload + node->payload_offset;
+        const uint8_t *payload = made.payload + at;
         for (uint32_t i = 0; i < node->count; i++) {
             uint8_t record[64];
             unpack(payload, node->count, i, record);
@@ -53,7 +50,7 @@ static void assert_like_twin(const core_site *site, uint32_t depth, uint32_t thr
         at += node->payload_size;
     }
     ref_tree_fini(&tree);
-    prep_subtree_fini(&made);
+    core_subtree_fini(&made);
 }
 
 static void check(core_kind kind, uint32_t bits, uint32_t count, uint32_t depth, uint32_t threshold)
@@ -137,18 +134,15 @@ static void one_node_is_made_of_all_the_points_given(void **state)
 {
     (void)state;
     core_site site;
-    prep_subtree made, tree;
-    mospt_err err = {0};
     core_site_make(CORE_CLUSTERED, 10, 500, 3, &site);
     prep_shape shape = core_shape(&site, 4, 100000); /* so that all octants add: the same node */
-    CORE_NEED(prep_solve_node(&shape, site.grid.root, 0, 0, site.records, site.count, &made, &err));
-    CORE_NEED(prep_solve(&shape, site.grid.root, 0, site.records, site.count, &tree, &err));
+    core_subtree made = core_solve_node(&shape, &site), tree = core_solve(&shape, &site);
     assert_int_equal(made.node_count, 1);
     assert_int_equal(tree.node_count, 1);
     assert_memory_equal(made.nodes[0].level_end, tree.nodes[0].level_end, 6 * sizeof(uint32_t));
     assert_memory_equal(made.payload, tree.payload, site.count * site.stride);
     assert_true(made.points_hash == tree.points_hash);
-    prep_subtree_fini(&made), prep_subtree_fini(&tree);
+    core_subtree_fini(&made), core_subtree_fini(&tree);
     core_site_fini(&site);
 }
 
