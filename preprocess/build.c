@@ -4,6 +4,7 @@
 #include "preprocess/dedupe.h"
 #include "preprocess/feed.h"
 #include "preprocess/finish.h"
+#include "preprocess/frame.h"
 #include "preprocess/plan.h"
 
 #include <fcntl.h>
@@ -186,37 +187,6 @@ static bool make_schema(build *b, mospt_err *err)
     return true;
 }
 
-/* The step is that of the finest LAS file; floating-point scans beside it ask for a step of its
- * size divided by a power of two, so that the positions of both are kept. doubtful  out: header
- * bounds reach too far for that step, and have not been held against the points yet */
-static bool make_grid(build *b, bool *doubtful, mospt_err *err)
-{
-    const prep_source *source = &b->result->source;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    double step = 0, extent = 0;
-    const double *offset = NULL;
-    bool any_float = false, all_measured = true;
-    for (uint32_t i = 0; i < source->scan_count; i++) {
-        const prep_scan_info *info = &source->scans[i].info;
-        all_measured = all_measured && source->scans[i].measured;
-        for (int a = 0; a < 3; a++)
-            low[a] = fmin(low[a], info->low[a]), high[a] = fmax(high[a], info->high[a]);
-        if (info->step > 0) {
-            if (step == 0 || info->step < step) step = info->step;
-            if (offset == NULL) offset = info->offset;
-        } else {
-            any_float = true;
-        }
-    }
-    for (int a = 0; a < 3; a++)
-        extent = fmax(extent, high[a] - low[a]);
-    while (any_float && step > 0 && extent > 0 && step > ldexp(extent, -30))
-        step /= 2;
-    bool ok = mospt_grid_make(low, high, step, offset, &b->metadata->grid, err);
-    *doubtful = !all_measured && (!ok || (step > 0 && b->metadata->grid.step > step));
-    return ok || *doubtful;
-}
-
 static bool check_space(const char *folder, uint64_t needed, const char *what, mospt_err *err)
 {
     struct statvfs disk;
@@ -308,6 +278,11 @@ static bool measure(build *b, bool all, mospt_err *err)
     enter(b, PREP_PHASE_MEASURE);
     b->points_total = 0;
     if (!prep_source_measure(source, all, tell_points, b, err)) return false;
+    double low[3], high[3];
+    if (prep_frame_range(source, low, high)) {
+        prep_source_set_range(source, low, high);
+        if (!prep_source_measure(source, true, tell_points, b, err)) return false;
+    }
     if (source->scan_count == 0) {
         if (source->left_out_count == 1 && err != NULL) *err = source->left_out[0].err;
         else
@@ -563,7 +538,7 @@ static bool run(build *b, mospt_err *err)
         if (outside && !measure(b, true, err)) goto done;
         for (uint32_t i = 0; i < source->scan_count; i++)
             of_scan[i] = prep_pack_sums_empty;
-        if (!make_grid(b, &outside, err)) goto done;
+        if (!prep_frame_grid(source, &b->metadata->grid, &outside, err)) goto done;
         if (outside) continue;
         if (!build_tree(b, of_scan, &outside, err)) goto done;
         if (outside && attempt > 0) {

@@ -72,9 +72,8 @@ static bool sort_and_keep(dedupe *d, prep_spool *spool, uint32_t level, mospt_er
     bool ok = (memory != NULL && blocks != NULL) || mospt_err_nomem(err, size);
     if (ok) {
         uint64_t *keys = (uint64_t *)memory;
-        mospt_records records = {.blocks = blocks,
-                                 .stride = d->stride,
-                                 .shift = prep_store_block_shift(d->env->store)};
+        mospt_records records = {
+            .blocks = blocks, .stride = d->stride, .shift = prep_store_block_shift(d->env->store)};
         prep_sorter sorter = {.grid = d->env->shape->grid, .records = &records};
         ok = prep_spool_view(d->env->store, spool, memory + sort_size(count), blocks, err);
         if (ok) {

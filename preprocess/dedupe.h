@@ -1,8 +1,8 @@
 /* preprocess/dedupe.h - of all points at one position, only the first.
  *
  * Nothing is lost unless someone asks for it. Then all points are divided among octants until those
- * of each fit in memory, sorted there, and what is left goes on in Morton order: whatever the memory
- * and the threads, always the same points in the same order. */
+ * of each fit in memory, sorted there, and what is left goes on in Morton order: whatever the
+ * memory and the threads, always the same points in the same order. */
 #pragma once
 #include "preprocess/pack.h"
 #include "preprocess/pass.h"

@@ -229,12 +229,12 @@ const prep_scan_info *prep_scan_describe(const prep_scan *scan)
     return &scan->info;
 }
 
-/* 0 for a coordinate triple that can be kept; NaN fails every comparison, so that it takes the slow
- * path too. */
-static bool is_in_range(const double *xyz)
+/* NaN fails every comparison. */
+static bool is_in_range(const prep_scan *scan, const double *xyz)
 {
-    return fabs(xyz[0]) <= COORDINATE_MAX && fabs(xyz[1]) <= COORDINATE_MAX &&
-           fabs(xyz[2]) <= COORDINATE_MAX;
+    for (int a = 0; a < 3; a++)
+        if (!(xyz[a] >= scan->range_low[a] && xyz[a] <= scan->range_high[a])) return false;
+    return true;
 }
 
 /* Moves what the scan declares to where its pose puts it. */
@@ -278,6 +278,10 @@ static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_
                         err))
         return false;
     if (scan->is_moved) move_info(scan);
+    for (int a = 0; a < 3; a++) {
+        scan->range_low[a] = options->has_range ? options->range_low[a] : -COORDINATE_MAX;
+        scan->range_high[a] = options->has_range ? options->range_high[a] : COORDINATE_MAX;
+    }
     scan->has_crop = options->has_crop;
     memcpy(scan->crop_low, options->crop_low, sizeof scan->crop_low);
     memcpy(scan->crop_high, options->crop_high, sizeof scan->crop_high);
@@ -287,15 +291,15 @@ static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_
 
 static bool is_kept(const prep_scan *scan, const double *xyz)
 {
-    if (!is_in_range(xyz)) return false;
+    if (!is_in_range(scan, xyz)) return false;
     for (int a = 0; scan->has_crop && a < 3; a++)
         if (xyz[a] < scan->crop_low[a] || xyz[a] > scan->crop_high[a]) return false;
     return true;
 }
 
-static prep_drop reason_for(const double *p)
+static prep_drop reason_for(const prep_scan *scan, const double *p)
 {
-    if (is_in_range(p)) return PREP_DROP_CROPPED;
+    if (is_in_range(scan, p)) return PREP_DROP_CROPPED;
     return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) ? PREP_DROP_OUT_OF_RANGE
                                                               : PREP_DROP_NOT_FINITE;
 }
@@ -316,7 +320,7 @@ static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
     for (uint32_t i = 0; i < batch->count; i++) {
         const double *p = batch->xyz + 3 * (size_t)i;
         scan->keep[i] = is_kept(scan, p);
-        if (!scan->keep[i]) scan->dropped[reason_for(p)]++;
+        if (!scan->keep[i]) scan->dropped[reason_for(scan, p)]++;
     }
     prep_batch_compact(batch, scan->keep);
     return true;

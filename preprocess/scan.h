@@ -57,8 +57,10 @@ typedef struct {
     const prep_pose_list *poses; /* borrowed; NULL: only sidecars move scans */
     bool has_crop;
     double crop_low[3], crop_high[3]; /* metres, world: what lies outside is dropped and counted */
-    prep_scan_memory *memory;         /* borrowed; for whoever opens many scans of a file in turn;
-                                         NULL: each finds its place in the file by itself */
+    bool has_range;
+    double range_low[3], range_high[3]; /* metres, world: what lies outside is out of range */
+    prep_scan_memory *memory;           /* borrowed; for whoever opens many scans of a file in turn;
+                                           NULL: each finds its place in the file by itself */
 } prep_scan_options;
 
 /* Opens scan `index` of a file, whose format is recognised by content first and by name last.

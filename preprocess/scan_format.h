@@ -28,6 +28,7 @@ struct prep_scan {
     prep_scan_info info;
     bool is_moved; /* by `move`, after the format has delivered a point */
     double move[16];
+    double range_low[3], range_high[3]; /* what lies outside cannot be kept */
     bool has_crop;
     double crop_low[3], crop_high[3];
     uint64_t dropped[PREP_DROP_REASONS];

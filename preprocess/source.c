@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { BATCHES = 3 };
+enum { BATCHES = 3, SAMPLES = 256 /* of a scan */ };
 
 static bool leave_out(prep_source *s, const char *name, const mospt_err *why, mospt_err *err)
 {
@@ -66,7 +66,7 @@ bool prep_source_open(const prep_folder_list *list, const prep_scan_options *opt
 
 static void free_scan(prep_source_scan *scan)
 {
-    free(scan->path), free(scan->name);
+    free(scan->path), free(scan->name), free(scan->samples);
 }
 
 void prep_source_close(prep_source *s)
@@ -125,18 +125,46 @@ static void take_account(prep_source_scan *scan, const prep_scan *reader)
     if (damage != NULL) scan->damage = *damage;
 }
 
+/* Every so many points one is taken; when there is no more room, every second of them goes. */
+typedef struct {
+    double (*at)[3];
+    uint32_t count;
+    uint64_t stride, skip; /* points until the next one */
+} sampling;
+
+static void take_samples(sampling *s, const prep_batch *batch)
+{
+    for (uint64_t i = s->skip; i < batch->count; i += s->stride) {
+        if (s->count == SAMPLES) {
+            for (uint32_t k = 0; k < SAMPLES / 2; k++)
+                memcpy(s->at[k], s->at[2 * k], sizeof *s->at);
+            s->count = SAMPLES / 2;
+            s->stride *= 2;
+        }
+        memcpy(s->at[s->count++], batch->xyz + 3 * i, sizeof *s->at);
+        s->skip = i + s->stride;
+    }
+    s->skip -= batch->count < s->skip ? batch->count : s->skip;
+}
+
 static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *points,
                          prep_source_report report, void *context, mospt_err *why, mospt_err *err)
 {
     prep_scan *reader = NULL;
     prep_batch batch = {0};
     bool ok = false, keep = scan->info.is_text;
+    sampling samples = {.stride = 1};
     if (!prep_scan_open(scan->path, scan->index, &s->options, &reader, why)) return true;
     for (int a = 0; a < 3; a++)
         scan->info.low[a] = INFINITY, scan->info.high[a] = -INFINITY;
     scan->points = 0;
     scan->spool_offset = s->spool_size;
     if (!prep_batch_init(&batch, &scan->info.attributes, PREP_BATCH_CAPACITY, err)) goto done;
+    samples.at = malloc(SAMPLES * sizeof *samples.at);
+    if (samples.at == NULL) {
+        mospt_err_nomem(err, SAMPLES * sizeof *samples.at);
+        goto done;
+    }
     for (;;) {
         if (!prep_scan_read(reader, &batch, why)) {
             if (scan->points > 0) scan->damage = *why, *why = (mospt_err){0};
@@ -148,6 +176,7 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
                 scan->info.low[a] = fmin(scan->info.low[a], batch.xyz[3 * i + (uint32_t)a]);
                 scan->info.high[a] = fmax(scan->info.high[a], batch.xyz[3 * i + (uint32_t)a]);
             }
+        take_samples(&samples, &batch);
         if (keep && !spool_write(s, &batch, err)) goto done;
         scan->points += batch.count;
         *points += batch.count;
@@ -160,13 +189,32 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
     else memcpy(scan->dropped, prep_scan_dropped(reader), sizeof scan->dropped);
     scan->spool_size = keep ? s->spool_size - scan->spool_offset : 0;
     scan->measured = true;
+    scan->samples = samples.at;
+    scan->sample_count = samples.count;
+    samples.at = NULL;
     if (scan->points == 0 && why->code == MOSPT_OK)
         mospt_err_set(why, MOSPT_EEMPTY, mospt_at_file(scan->path), "holds no point");
     ok = true;
 done:
+    free(samples.at);
     prep_batch_fini(&batch);
     prep_scan_close(reader);
     return ok;
+}
+
+void prep_source_set_range(prep_source *s, const double low[3], const double high[3])
+{
+    s->options.has_range = true;
+    memcpy(s->options.range_low, low, sizeof s->options.range_low);
+    memcpy(s->options.range_high, high, sizeof s->options.range_high);
+    for (uint32_t i = 0; i < s->scan_count; i++) {
+        prep_source_scan *scan = &s->scans[i];
+        free(scan->samples);
+        scan->samples = NULL;
+        scan->sample_count = 0;
+        scan->measured = false;
+        memset(&scan->damage, 0, sizeof scan->damage);
+    }
 }
 
 bool prep_source_measure(prep_source *s, bool all, prep_source_report report, void *context,

@@ -11,7 +11,10 @@ typedef struct {
     char *path, *name; /* owned */
     uint32_t index;    /* of the scan in its file */
     prep_scan_info info;
-    bool measured;                     /* low and high are those of the points */
+    bool measured;        /* low and high are those of the points */
+    double (*samples)[3]; /* [sample_count], owned: some of its points, evenly spread;
+                             only if measured */
+    uint32_t sample_count;
     uint64_t spool_offset, spool_size; /* of its batches in the spool; size 0: read the file */
     /* After it has been read: */
     uint64_t points;
@@ -51,6 +54,9 @@ typedef bool (*prep_source_report)(void *context, uint64_t points);
  * disk), MOSPT_ENOMEM, MOSPT_ECANCELLED */
 bool prep_source_measure(prep_source *source, bool all, prep_source_report report, void *context,
                          mospt_err *err);
+
+/* Forgets what was measured, and leaves out of range from now on what lies outside this box. */
+void prep_source_set_range(prep_source *source, const double low[3], const double high[3]);
 
 /* The stream. */
 typedef struct prep_stream prep_stream;

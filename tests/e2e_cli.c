@@ -338,6 +338,25 @@ static void what_is_outside_the_crop_is_counted(void **state)
     expect("build b.xyz -o none.ipts --crop 5,0,0,1,1,1", WRONG_USE);
 }
 
+static void a_stray_point_far_away_is_left_out(void **state)
+{
+    (void)state;
+    char *text = malloc(400000), *at = text;
+    assert_non_null(text);
+    for (int i = 0; i < 5000; i++)
+        at += sprintf(at, i == 2000 ? "1e9 1 2\n" : "%d.5 %d 3\n", i % 100, i / 100);
+    make_text("b.xyz", text);
+    free(text);
+    expect("build b.xyz -o site.ipts --json", DONE);
+    json_t *json = parse_output();
+    assert_int_equal(integer_at(json, "points"), 4999);
+    assert_int_equal(integer_at(json, "dropped"), 1);
+    json_decref(json);
+    expect("info site.ipts", DONE);
+    assert_non_null(strstr(out, "1  dropped: out of range"));
+    expect("check site.ipts", DONE);
+}
+
 static void only_the_attributes_asked_for_are_kept(void **state)
 {
     (void)state;
@@ -581,6 +600,7 @@ int main(int argc, char **argv)
         CASE(a_scan_file_says_what_is_in_it),
         CASE(each_file_becomes_a_dataset_once),
         CASE(what_is_outside_the_crop_is_counted),
+        CASE(a_stray_point_far_away_is_left_out),
         CASE(only_the_attributes_asked_for_are_kept),
         CASE(duplicates_are_left_out_when_asked_for),
         CASE(scans_in_several_reference_systems_are_named),

@@ -122,8 +122,8 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
                          .written = &written,
                          .report = go_on};
     for (uint32_t i = 0; i < site->count; i++)
-        CORE_NEED(prep_spool_append(store, &all, site->records + i * site->stride, site->stride,
-                                    &err));
+        CORE_NEED(
+            prep_spool_append(store, &all, site->records + i * site->stride, site->stride, &err));
     CORE_NEED(prep_spool_seal(store, &all, &err));
     CORE_NEED(prep_pass_begin(&env, site->grid.root, 0, &pass, &err));
     CORE_NEED(prep_feed_spool(&env, pass, &all, &err));
@@ -147,7 +147,11 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
 static void the_first_at_each_position_is_kept(void **state)
 {
     static const way ways[] = {
-        {.threads = 1, .levels = 3, .block_size = 1 << 14, .store_memory = 1 << 30, .solve_memory = 1 << 24},
+        {.threads = 1,
+         .levels = 3,
+         .block_size = 1 << 14,
+         .store_memory = 1 << 30,
+         .solve_memory = 1 << 24},
         {.threads = 2, .levels = 2, .block_size = 400, .store_memory = 5000, .solve_memory = 30000},
         {.threads = 7, .levels = 2, .block_size = 100, .store_memory = 0, .solve_memory = 9000},
     };
