@@ -202,7 +202,11 @@ static item *next_to_solve(line *l)
 /* Under the lock; does one step without it. Returns false when nothing is left to be done. */
 static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
 {
-    item *i = next_to_emit(l);
+    /* Parts are solved ahead, so that while one thread is busy with a large one there are nodes to
+     * be made for the others. */
+    bool ahead = l->in_flight > prep_workers_count(l->env->workers);
+    item *i = ahead ? next_to_emit(l) : NULL, *solving = i == NULL ? next_to_solve(l) : NULL;
+    if (i == NULL && solving == NULL) i = next_to_emit(l);
     if (i != NULL) {
         uint32_t n = i->nodes_taken++;
         uint64_t hash = 0;
@@ -210,11 +214,11 @@ static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
         *ok = emit_node(l->env, i, n, b, &hash, err);
         pthread_mutex_lock(&l->lock);
         *ok = *ok && settle_node(l, i, n, hash, err);
-    } else if ((i = next_to_solve(l)) != NULL) {
+    } else if (solving != NULL) {
         pthread_mutex_unlock(&l->lock);
-        *ok = solve_item(l->env, i, err);
+        *ok = solve_item(l->env, solving, err);
         pthread_mutex_lock(&l->lock);
-        i->is_solved = *ok;
+        solving->is_solved = *ok;
         *ok = *ok && place_solved(l, err);
     } else if (l->next_to_emit < l->item_count && !l->failed) {
         pthread_cond_wait(&l->change, &l->lock);

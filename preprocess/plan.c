@@ -11,7 +11,7 @@ static const uint64_t FIXED_SIZE = UINT64_C(24) << 20;
  * each waste little. */
 enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 80 << 10, SLICES_MAX = 8 };
 /* Rejection files of more points are cut by another pass, which all threads share. */
-enum { SOLVE_POINTS_MAX = 1 << 22 };
+enum { SOLVE_POINTS_MAX = 1 << 24 };
 
 uint64_t prep_plan_machine_memory(void)
 {
