@@ -204,16 +204,17 @@ static bool take_sample(prep_scan *scan, e57_state *e57, mospt_err *err)
 static void set_step(prep_scan *scan, const e57_state *e57)
 {
     const prep_e57_points *p = &e57->points;
-    double step = INFINITY;
+    double scale[3];
     if (p->is_spherical || p->has_rotation) return;
     for (int a = 0; a < 3; a++) {
         const prep_e57_field *f = p->channel[p->xyz[a]].field;
         if (f->kind != PREP_E57_SCALED && f->kind != PREP_E57_INTEGER) return;
-        step = fmin(step, fabs(f->scale));
+        scale[a] = fabs(f->scale);
+        /* finer than anything measured: not a grid, but a float in disguise */
+        if (!(scale[a] >= 1e-9)) return;
     }
-    if (step < 1e-9) return; /* finer than anything measured: not a grid, but a float in disguise */
-    scan->info.step = step;
-    for (int a = 0; a < 3; a++)
+    scan->info.step = prep_scan_common_step(scale);
+    for (int a = 0; a < 3 && scan->info.step > 0; a++)
         scan->info.offset[a] = p->channel[p->xyz[a]].field->offset + p->pose[4 * a + 3];
 }
 

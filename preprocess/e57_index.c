@@ -241,10 +241,10 @@ static bool pick(prep_scan *scan, const file_index *index, uint32_t wanted, prep
         return false;
     }
     if (index->usable == 0)
-        return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
-                             "the E57 file holds %" PRIu32 " scans and %" PRIu32
-                             " images, but no points",
-                             index->seen, index->images);
+        return mospt_err_set(
+            err, MOSPT_EEMPTY, mospt_at_file(scan->path),
+            "the E57 file holds %" PRIu32 " scan%s and %" PRIu32 " image%s, but no points",
+            index->seen, index->seen == 1 ? "" : "s", index->images, index->images == 1 ? "" : "s");
     out->scan_count = index->usable;
     if (wanted >= index->usable) return true;
     if (wanted == 0) note(scan, &index->fault);

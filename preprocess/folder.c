@@ -17,6 +17,7 @@ typedef struct {
     prep_folder_file file;
     char *real; /* owned, canonical path: what makes two files the same */
     bool is_named, is_link;
+    bool is_ambiguous; /* another file has the same name */
 } found_file;
 
 typedef struct {
@@ -56,7 +57,8 @@ static bool add_file(finder *f, const char *path, const char *name, bool is_name
     }
     struct stat st;
     bool is_link = lstat(path, &st) == 0 && S_ISLNK(st.st_mode);
-    found_file file = {{strdup(path), strdup(name)}, realpath(path, NULL), is_named, is_link};
+    found_file file = {
+        {strdup(path), strdup(name)}, realpath(path, NULL), is_named, is_link, false};
     if (file.real == NULL) file.real = strdup(path);
     f->at[f->count++] = file;
     return (file.file.path != NULL && file.file.name != NULL && file.real != NULL) ||
@@ -181,6 +183,42 @@ static void drop_duplicates(finder *f)
     if (n > 0) qsort(f->at, n, sizeof *f->at, compare_names);
 }
 
+/* The name with one more of the file's folders in front, where there is one. */
+static char *lengthen(const found_file *file)
+{
+    const char *start = file->real + strlen(file->real);
+    size_t parts = 2;
+    for (const char *p = file->file.name; *p != '\0'; p++)
+        parts += *p == '/';
+    for (; start > file->real && parts > 0; start--)
+        parts -= start[-1] == '/';
+    return strdup(*start == '/' ? start + 1 : start);
+}
+
+/* Of files in different places that were named one by one, several may have the same name: a
+ * dataset should tell them apart, and one for each of them needs a place of its own. */
+static bool tell_apart(finder *f, mospt_err *err)
+{
+    for (bool again = true; again;) {
+        again = false;
+        for (size_t i = 0; i < f->count; i++) {
+            const char *name = f->at[i].file.name;
+            f->at[i].is_ambiguous = (i > 0 && strcmp(f->at[i - 1].file.name, name) == 0) ||
+                                    (i + 1 < f->count && strcmp(f->at[i + 1].file.name, name) == 0);
+        }
+        for (size_t i = 0; i < f->count; i++) {
+            if (!f->at[i].is_ambiguous) continue;
+            char *name = lengthen(&f->at[i]);
+            if (name == NULL) return mospt_err_nomem(err, strlen(f->at[i].real));
+            again = again || strcmp(name, f->at[i].file.name) != 0;
+            free(f->at[i].file.name);
+            f->at[i].file.name = name;
+        }
+        if (f->count > 0) qsort(f->at, f->count, sizeof *f->at, compare_names);
+    }
+    return true;
+}
+
 /* Extensions that promise a scan, so that a damaged file is named rather than passed over. */
 static bool promises_scan(const char *path)
 {
@@ -256,6 +294,8 @@ bool prep_folder_list_make(const char *const *paths, size_t path_count, prep_fol
         ok = find_path(&f, paths[i], err);
     if (!ok) goto done;
     drop_duplicates(&f);
+    ok = tell_apart(&f, err);
+    if (!ok) goto done;
     list.files = calloc(f.count + 1, sizeof *list.files);
     list.unknown = calloc(f.count + 1, sizeof *list.unknown);
     ok = list.files != NULL && list.unknown != NULL;

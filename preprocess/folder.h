@@ -5,8 +5,8 @@
 
 typedef struct {
     char *path; /* owned, as it can be opened */
-    char *name; /* owned, relative to the folder that was named; what sources are called in a
-                   dataset */
+    char *name; /* owned, relative to the folder that was named, and with more folders where files
+                   would be called the same; what sources are called in a dataset */
 } prep_folder_file;
 
 typedef struct {

@@ -9,8 +9,8 @@
 #include "mospt/grid.h"
 #include "preprocess/source.h"
 
-/* doubtful  out: header bounds reach too far for the wanted step, and have not been held against the
- *           points yet */
+/* doubtful  out: header bounds reach too far for the wanted step, and have not been held against
+ * the points yet */
 bool prep_frame_grid(const prep_source *source, mospt_grid *out, bool *doubtful, mospt_err *err);
 
 /* The box outside of which points are out of range.

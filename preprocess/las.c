@@ -122,8 +122,24 @@ static bool open_chunks(prep_scan *scan, las_state *las, mospt_err *err)
     return true;
 }
 
+/* Records behind the last one that the header claims, where nothing else has a place. */
+static uint64_t count_unclaimed(const prep_scan *scan, const prep_las_header *h)
+{
+    uint64_t end = h->data_offset + h->present * h->record_length,
+             size = prep_input_size(scan->input);
+    if (h->is_compressed || h->has_tail || size <= end) return 0;
+    bool is_whole = h->declared == 0 || (size - end) % h->record_length == 0;
+    return is_whole ? (size - end) / h->record_length : 0;
+}
+
 static bool check_openable(prep_scan *scan, const prep_las_header *h, mospt_err *err)
 {
+    uint64_t unclaimed = count_unclaimed(scan, h);
+    if (h->declared == 0 && unclaimed > 0)
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_byte(scan->path, 107),
+                             "the header claims no points, and there is room for %" PRIu64
+                             ": the recording was not closed",
+                             unclaimed);
     if (h->declared == 0)
         return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
                              "the LAS file holds no points");
@@ -149,6 +165,13 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
             scan, mospt_at_byte(scan->path, record_offset(las, las->header.present)),
             "the file ends here: the header claims %" PRIu64 " points, %" PRIu64 " are there",
             las->header.declared, las->header.present);
+    uint64_t unclaimed = count_unclaimed(scan, &las->header);
+    if (unclaimed > 0)
+        prep_scan_set_damage(
+            scan, mospt_at_byte(scan->path, record_offset(las, las->header.present)),
+            "the header claims %" PRIu64 " points; what follows has room for %" PRIu64
+            " more, which are left out",
+            las->header.declared, unclaimed);
 
     prep_las_sample sample;
     if (!prep_las_sample_init(&sample, err)) return false;

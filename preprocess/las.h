@@ -50,7 +50,11 @@ typedef struct {
     bool has_bounds; /* finite and ordered */
     prep_las_extra extra[PREP_LAS_EXTRA_MAX];
     uint32_t extra_count;
-    char crs[PREP_CRS_SIZE]; /* WKT where there is one, else "EPSG:..." of the GeoTIFF keys; "" */
+    bool has_tail;           /* something is meant to stand behind the points */
+    char crs[PREP_CRS_SIZE]; /* WKT where there is one, else "EPSG:..." of the GeoTIFF keys or their
+                                text; "" */
+    uint64_t geotext_at, geotext_size;   /* where that text is, within the file */
+    uint16_t citation_at, citation_size; /* within it */
 } prep_las_header;
 
 /* Reads the header and the records that describe extra bytes, every length checked against the

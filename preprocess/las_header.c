@@ -10,6 +10,7 @@
 
 enum {
     HEADER_SIZE = 227,
+    HEADER_SIZE_13 = 235,
     HEADER_SIZE_14 = 375,
     VLR_SIZE = 54,
     EVLR_SIZE = 60,
@@ -18,6 +19,7 @@ enum {
     LASZIP_RECORD = 22204,
     WKT_RECORD = 2112,
     GEOKEYS_RECORD = 34735,
+    GEOTEXT_RECORD = 34737,
     GEOKEYS_SIZE_MAX = 4096,
 };
 
@@ -162,16 +164,18 @@ static bool read_wkt(prep_input *in, uint64_t offset, uint64_t size, prep_las_he
     if (size >= sizeof h->crs) size = sizeof h->crs - 1;
     if (!prep_input_read_at(in, offset, h->crs, size, &got, err)) return false;
     h->crs[got] = '\0';
-    h->crs[strcspn(h->crs, "\r\n")] = '\0';
     return true;
 }
 
 /* GeoTIFF keys: an array of four 16-bit numbers each, after a head of the same shape. Of them, the
- * code of the projected, else of the geographic system, and that of the heights. */
+ * code of the projected, else of the geographic system, and that of the heights; and where the text
+ * that names a system without a code stands. */
 static bool read_geokeys(prep_input *in, uint64_t offset, uint64_t size, prep_las_header *h,
                          mospt_err *err)
 {
     enum { GEOGRAPHIC = 2048, PROJECTED = 3072, VERTICAL = 4096, PRIVATE_FROM = 32767 };
+    static const uint16_t citations[3] = {2049, 1026, 3073}; /* the last one tells most */
+    int best = -1;
     uint8_t keys[GEOKEYS_SIZE_MAX];
     size_t got;
     uint16_t code[3] = {0};
@@ -180,6 +184,12 @@ static bool read_geokeys(prep_input *in, uint64_t offset, uint64_t size, prep_la
     for (size_t at = 8; at + 8 <= got; at += 8) {
         uint16_t id = prep_le16(keys + at), place = prep_le16(keys + at + 2);
         uint16_t value = prep_le16(keys + at + 6);
+        for (int i = best + 1; i < 3 && place == GEOTEXT_RECORD; i++) {
+            if (id != citations[i]) continue;
+            best = i;
+            h->citation_at = value;
+            h->citation_size = prep_le16(keys + at + 4);
+        }
         if (place != 0 || value == 0 || value >= PRIVATE_FROM) continue;
         if (id == GEOGRAPHIC) code[0] = value;
         if (id == PROJECTED) code[1] = value;
@@ -204,6 +214,21 @@ static bool take_record(prep_input *in, const uint8_t *head, uint64_t payload, u
     if (record == WKT_RECORD) return read_wkt(in, payload, size, h, err);
     if (record == GEOKEYS_RECORD && h->crs[0] == '\0')
         return read_geokeys(in, payload, size, h, err);
+    if (record == GEOTEXT_RECORD) h->geotext_at = payload, h->geotext_size = size;
+    return true;
+}
+
+/* A system without a code still has a name, which ends with a bar. */
+static bool read_citation(prep_input *in, prep_las_header *h, mospt_err *err)
+{
+    size_t size = h->citation_size, got;
+    if (h->crs[0] != '\0' || h->citation_at >= h->geotext_size) return true;
+    if (size > h->geotext_size - h->citation_at) size = h->geotext_size - h->citation_at;
+    if (size >= sizeof h->crs) size = sizeof h->crs - 1;
+    if (!prep_input_read_at(in, h->geotext_at + h->citation_at, h->crs, size, &got, err))
+        return false;
+    h->crs[got] = '\0';
+    h->crs[strcspn(h->crs, "|")] = '\0';
     return true;
 }
 
@@ -268,6 +293,10 @@ bool prep_las_header_read(prep_input *input, prep_las_header *out, mospt_err *er
     if (!walk_vlrs(input, &h, err)) return false;
     choose_count(input, p, has_14, &h);
     if (has_14 && !h.is_compressed && !walk_evlrs(input, p, &h, err)) return false;
+    if (!read_citation(input, &h, err)) return false;
+    bool has_waves =
+        h.version_minor >= 3 && h.header_size >= HEADER_SIZE_13 && prep_le64(p + HEADER_SIZE) != 0;
+    h.has_tail = has_waves || (has_14 && prep_le32(p + 243) > 0);
     *out = h;
     return true;
 }

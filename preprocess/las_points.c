@@ -169,9 +169,8 @@ void prep_las_describe(prep_scan *scan, const prep_las_header *h)
     info->point_count = h->present;
     info->has_bounds = h->has_bounds;
     snprintf(info->crs, sizeof info->crs, "%s", h->crs);
-    info->step = h->scale[0];
+    info->step = prep_scan_common_step(h->scale);
     for (int a = 0; a < 3; a++) {
-        if (h->scale[a] < info->step) info->step = h->scale[a];
         info->offset[a] = h->offset[a];
         info->low[a] = h->low[a];
         info->high[a] = h->high[a];

@@ -314,6 +314,14 @@ static void describe(prep_scan *scan, const pcd_state *pcd)
         prep_scan_set_damage(scan, mospt_at_line(scan->path, h->line_count),
                              "WIDTH and HEIGHT make %" PRIu64 " points, POINTS are %" PRIu64,
                              h->grid_points, h->points);
+    uint64_t end = h->size + h->points * h->record_size, size = prep_input_size(scan->input);
+    bool is_plain = h->encoding == PREP_PCD_BINARY && !prep_input_is_gzip(scan->input);
+    if (is_plain && pcd->rows.present == h->points && size > end &&
+        (size - end) % h->record_size == 0)
+        prep_scan_set_damage(scan, mospt_at_byte(scan->path, end),
+                             "the header claims %" PRIu64 " points; what follows has room for "
+                             "%" PRIu64 " more, which are left out",
+                             h->points, (size - end) / h->record_size);
 }
 
 static bool pcd_open(prep_scan *scan, uint32_t index, const prep_scan_options *options,

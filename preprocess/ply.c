@@ -225,6 +225,23 @@ static void describe(prep_scan *scan, const ply_state *ply)
     scan->info.is_text = ply->header.encoding == PREP_PLY_ASCII || prep_input_is_gzip(scan->input);
 }
 
+/* Rows behind the vertices, where nothing else has a place. */
+static void note_unclaimed(prep_scan *scan, const ply_state *ply)
+{
+    const prep_ply_header *h = &ply->header;
+    const prep_ply_element *e = ply->rows.vertex;
+    uint64_t end = ply->rows.offset + e->count * e->row_size, size = prep_input_size(scan->input);
+    if (h->encoding == PREP_PLY_ASCII || e->has_lists || prep_input_is_gzip(scan->input) ||
+        e != &h->element[h->element_count - 1] || ply->rows.present < e->count || size <= end ||
+        (size - end) % e->row_size != 0)
+        return;
+    prep_scan_set_damage(scan, mospt_at_byte(scan->path, end),
+                         "the header claims %" PRIu64
+                         " vertices; what follows has room for %" PRIu64
+                         " more, which are left out",
+                         e->count, (size - end) / e->row_size);
+}
+
 static void release(ply_state *ply)
 {
     prep_ply_rows_release(&ply->rows);
@@ -267,6 +284,7 @@ static bool ply_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
     if (!prep_ply_rows_locate(scan, &ply->rows, err)) return false;
     describe(scan, ply);
     if (!take_sample(scan, ply, err)) return false;
+    note_unclaimed(scan, ply);
     make_planes(scan, ply);
     release(ply);
     ply->rows.may_split = true;

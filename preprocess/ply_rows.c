@@ -206,7 +206,8 @@ bool prep_ply_rows_locate(prep_scan *scan, prep_ply_rows *rows, mospt_err *err)
         prep_lines_fini(&rows->lines);
     }
     rows->present = count_present(scan, rows);
-    return true;
+    /* lists before the vertices were read ahead of where they end */
+    return prep_ply_rows_seek(scan, rows, 0, err);
 }
 
 bool prep_ply_rows_seek(prep_scan *scan, prep_ply_rows *rows, uint64_t vertex, mospt_err *err)

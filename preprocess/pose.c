@@ -26,6 +26,28 @@ static int read_numbers(const char *text, const char *end, double out[16])
     }
 }
 
+static const char *line_end(const char *text, const char *end)
+{
+    const char *newline = memchr(text, '\n', (size_t)(end - text));
+    return newline != NULL ? newline : end;
+}
+
+/* The mark that editors put in front of UTF-8. */
+static void blank_mark(char *bytes, size_t size)
+{
+    if (size >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0) memset(bytes, ' ', 3);
+}
+
+static void blank_comments(char *text, char *end)
+{
+    for (; text < end; text++) {
+        char *stop = text + (line_end(text, end) - text),
+             *mark = memchr(text, '#', (size_t)(stop - text));
+        if (mark != NULL) memset(mark, ' ', (size_t)(stop - mark));
+        text = stop;
+    }
+}
+
 /* 12 numbers are the upper three rows; the last row of 16 must be 0 0 0 1. */
 static bool finish_matrix(int count, double m[16])
 {
@@ -87,9 +109,9 @@ bool prep_pose_list_read(const char *path, prep_pose_list *out, mospt_err *err)
     size_t size = 0;
     bool ok = mospt_file_read_whole(path, FILE_SIZE_MAX, &bytes, &size, err);
     uint64_t line = 0;
+    if (ok) blank_mark(bytes, size);
     for (const char *text = bytes, *next; ok && text < bytes + size; text = next) {
-        const char *end = memchr(text, '\n', (size_t)(bytes + size - text));
-        if (end == NULL) end = bytes + size;
+        const char *end = line_end(text, bytes + size);
         next = end + 1;
         line++;
         while (text < end && strchr(" \t\r", *text) != NULL)
@@ -102,11 +124,21 @@ bool prep_pose_list_read(const char *path, prep_pose_list *out, mospt_err *err)
     return ok;
 }
 
-static bool is_named(const prep_pose *pose, const char *file, const char *scan)
+/* By the scan's own name, or by the last part of the path, folders included or not, with or without
+ * the extension. */
+static bool is_named(const prep_pose *pose, const char *path, const char *scan)
 {
-    size_t n = strlen(pose->name);
-    if (strcmp(pose->name, file) == 0 || strcmp(pose->name, scan) == 0) return true;
-    return strncmp(pose->name, file, n) == 0 && file[n] == '.' && strchr(file + n + 1, '.') == NULL;
+    size_t n = strlen(pose->name), length = strlen(path);
+    const char *slash = strrchr(path, '/'), *dot = strrchr(slash != NULL ? slash : path, '.');
+    size_t lengths[2] = {length, dot != NULL ? (size_t)(dot - path) : length};
+    if (strcmp(pose->name, scan) == 0) return true;
+    for (int k = 0; k < 2 && n > 0; k++) {
+        const char *tail = path + lengths[k] - n;
+        if (lengths[k] >= n && strncmp(tail, pose->name, n) == 0 &&
+            (tail == path || tail[-1] == '/'))
+            return true;
+    }
+    return false;
 }
 
 static bool read_sidecar(const char *path, double matrix[16], mospt_err *err)
@@ -114,6 +146,8 @@ static bool read_sidecar(const char *path, double matrix[16], mospt_err *err)
     char *bytes = NULL;
     size_t size = 0;
     if (!mospt_file_read_whole(path, FILE_SIZE_MAX, &bytes, &size, err)) return false;
+    blank_mark(bytes, size);
+    blank_comments(bytes, bytes + size);
     bool ok = finish_matrix(read_numbers(bytes, bytes + size, matrix), matrix) ||
               not_a_matrix(path, 0, err);
     free(bytes);
@@ -127,7 +161,7 @@ bool prep_pose_find(const prep_pose_list *list, const char *scan_path, const cha
     char sidecar[4096];
     *found = false;
     for (size_t i = 0; list != NULL && i < list->count; i++) {
-        if (!is_named(&list->poses[i], file, scan_name)) continue;
+        if (!is_named(&list->poses[i], scan_path, scan_name)) continue;
         memcpy(matrix, list->poses[i].matrix, sizeof list->poses[i].matrix);
         return *found = true;
     }

@@ -2,8 +2,8 @@
  * wrongly.
  *
  * A pose is a row-major 4 x 4 matrix from the coordinates of the file to the world. It comes from a
- * sidecar beside the scan, NAME.pose.txt with 12 or 16 numbers, or from one list for many scans: a
- * line each, the scan's file name and its numbers. */
+ * sidecar beside the scan, NAME.pose.txt with 12 or 16 numbers and comments behind #, or from one
+ * list for many scans: a line each, the scan's file name and its numbers. */
 #pragma once
 #include "mospt/err.h"
 
@@ -22,9 +22,9 @@ typedef struct {
 bool prep_pose_list_read(const char *path, prep_pose_list *out, mospt_err *err);
 void prep_pose_list_fini(prep_pose_list *list);
 
-/* Finds the pose of a scan: in the list (NULL: none) by its scan name, file name or file name
- * without extension; else in a sidecar. found    out, false if there is none errors   MOSPT_EIO,
- * MOSPT_EFORMAT: a sidecar that is no matrix */
+/* Finds the pose of a scan: in the list (NULL: none) by its scan name or file name, with as many of
+ * its folders as are given, with or without extension; else in a sidecar. found    out, false if
+ * there is none errors   MOSPT_EIO, MOSPT_EFORMAT: a sidecar that is no matrix */
 bool prep_pose_find(const prep_pose_list *list, const char *scan_path, const char *scan_name,
                     bool *found, double matrix[16], mospt_err *err);
 

@@ -64,6 +64,20 @@ int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type, 
     return (int)schema->count - 1;
 }
 
+double prep_scan_common_step(const double scale[3])
+{
+    double least = fmin(scale[0], fmin(scale[1], scale[2]));
+    for (int parts = 1; parts <= 10; parts++) {
+        bool fits = true;
+        for (int a = 0; a < 3; a++) {
+            double ratio = scale[a] / (least / parts);
+            fits = fits && ratio < 1e9 && fabs(ratio - nearbyint(ratio)) < 1e-9 * ratio;
+        }
+        if (fits) return least / parts;
+    }
+    return 0;
+}
+
 static bool has_extension(const char *path, const char *extension)
 {
     size_t n = strlen(path), m = strlen(extension);
@@ -115,7 +129,39 @@ static bool looks_like_ptx(const uint8_t *head, size_t size)
 static bool looks_like_pcd(const uint8_t *head, size_t size)
 {
     if (starts_with(head, size, "# .PCD")) return true;
-    return starts_with(head, size, "VERSION ") && memmem(head, size, "\nFIELDS ", 8) != NULL;
+    bool has_fields =
+        starts_with(head, size, "FIELDS ") || memmem(head, size, "\nFIELDS ", 8) != NULL;
+    return has_fields && memmem(head, size, "\nDATA ", 6) != NULL;
+}
+
+/* Several lines of as many numbers each, below a count of them at most. */
+static bool looks_like_points(const uint8_t *head, size_t size)
+{
+    enum { LINES_LEAST = 4, LINES_MOST = 12 };
+    char text[1024];
+    size_t n = size < sizeof text - 1 ? size : sizeof text - 1;
+    memcpy(text, head, n);
+    while (n < size && n > 0 && text[n - 1] != '\n')
+        n--;
+    text[n] = '\0';
+    const char *p = text;
+    int columns = count_numbers(&p);
+    if (columns == 1) columns = count_numbers(&p);
+    int lines = 1;
+    for (; lines < LINES_MOST && *p != '\0'; lines++)
+        if (count_numbers(&p) != columns) return false;
+    return columns >= 3 && lines >= LINES_LEAST;
+}
+
+static bool looks_like_utf16(const uint8_t *head, size_t size)
+{
+    static const uint8_t marks[2][2] = {{0xff, 0xfe}, {0xfe, 0xff}};
+    size_t look = size < 64 ? size : 64, zeros[2] = {0};
+    if (size < 4) return false;
+    if (memcmp(head, marks[0], 2) == 0 || memcmp(head, marks[1], 2) == 0) return true;
+    for (size_t i = 0; i < look; i++)
+        zeros[i % 2] += head[i] == 0;
+    return (zeros[0] >= look / 2 && zeros[1] == 0) || (zeros[1] >= look / 2 && zeros[0] == 0);
 }
 
 /* Text has hardly any control characters; a single one is a fault in it, and no reason to refuse
@@ -141,6 +187,7 @@ prep_file_kind prep_scan_recognise(const char *path, const uint8_t *head, size_t
     if (starts_with(head, size, "ply") && size > 3 && isspace(head[3])) return PREP_FILE_PLY;
     if (looks_like_pcd(head, size)) return PREP_FILE_PCD;
     if (looks_like_ptx(head, size)) return PREP_FILE_PTX;
+    if (looks_like_points(head, size)) return PREP_FILE_TEXT;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (has_extension(path, names[i].extension)) return names[i].kind;
     }
@@ -181,11 +228,27 @@ static bool choose_format(prep_scan *scan, mospt_err *err)
     case PREP_FILE_BINARY:
         break;
     }
-    return mospt_err_set(err, MOSPT_EFORMAT, where,
-                         "binary data, but no scan format that this program knows");
+    return mospt_err_set(err, MOSPT_EFORMAT, where, "%s",
+                         looks_like_utf16(head, got)
+                             ? "text in UTF-16 is not read; save it as UTF-8"
+                             : "binary data, but no scan format that this program knows");
 }
 
 static bool place_scan(prep_scan *scan, const prep_scan_options *options, mospt_err *err);
+
+/* On one line, as whoever shows it expects; WKT may be indented. */
+static void tidy_crs(char *crs)
+{
+    char *out = crs;
+    for (const char *p = crs; *p != '\0'; p++) {
+        bool is_blank = (unsigned char)*p <= ' ';
+        if (is_blank && (out == crs || out[-1] == ' ')) continue;
+        *out++ = is_blank ? ' ' : *p;
+    }
+    while (out > crs && out[-1] == ' ')
+        out--;
+    *out = '\0';
+}
 
 bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *options,
                     prep_scan **out, mospt_err *err)
@@ -207,6 +270,7 @@ bool prep_scan_open(const char *path, uint32_t index, const prep_scan_options *o
         goto fail;
     }
     if (!place_scan(scan, options != NULL ? options : &defaults, err)) goto fail;
+    tidy_crs(scan->info.crs);
     scan->was_damaged_at_open = scan->is_damaged;
     *out = scan;
     return true;

@@ -37,8 +37,8 @@ typedef struct {
     bool has_bounds; /* the header declares bounds; they may lie */
     double low[3], high[3]; /* metres, world; only with has_bounds */
     bool is_text;           /* parsing is the cost: read once and spool, rather than read twice */
-    double step;      /* resolution that the format declares (LAS: the finest scale), 0 for floating
-                         point */
+    double step; /* resolution that the format declares (LAS: what all scales are multiples of),
+                    0 for floating point */
     double offset[3]; /* LAS: offset of its integer coordinates; else 0 */
     bool has_rgb, has_intensity;
     bool has_pose;

@@ -49,6 +49,10 @@ void prep_scan_set_damage(prep_scan *scan, mospt_where where, const char *format
 int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type,
                             uint32_t components);
 
+/* The coarsest step of which three scales are multiples: positions on such a lattice keep every
+ * bit. scale    [3], > 0 returns  0 if there is none that is worth the name */
+double prep_scan_common_step(const double scale[3]);
+
 /* What the bytes, and failing that the name, say about a file. */
 typedef enum {
     PREP_FILE_LAS,

@@ -8,15 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    LINE_BUFFER_SIZE = 256 * 1024,
-    SAMPLE_HEAD = 1024, /* lines from the start of the file */
-    SAMPLE_PLACES = 16, /* and some from places spread evenly over the rest */
-    SAMPLE_LINES = 64,
-    QUOTE_SIZE = 60, /* of a line, in a message */
-    SAMPLE_MAX = SAMPLE_HEAD + SAMPLE_PLACES * SAMPLE_LINES,
-};
-
 typedef struct {
     prep_text_columns columns;
     prep_text_blocks blocks;
@@ -26,184 +17,35 @@ typedef struct {
     bool is_at_end;
 } text_state;
 
-/* The lines that are looked at before the columns are understood. */
-typedef struct {
-    double (*values)[PREP_TEXT_COLUMNS_MAX]; /* [SAMPLE_MAX], owned */
-    uint64_t words[SAMPLE_MAX];
-    uint32_t columns[SAMPLE_MAX];
-    uint32_t count;
-    uint32_t decimal_commas; /* lines that have them */
-    bool is_counted;         /* the first line of numbers is a single integer */
-    uint64_t counted;        /* points announced in the lines looked at */
-    uint32_t count_lines;
-    char first[QUOTE_SIZE + 1]; /* start of the first line that is no comment */
-    uint64_t first_line, header_line;
-    char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
-    uint32_t name_count;
-    char comment[PREP_TEXT_COLUMNS_MAX]
-                [PREP_TEXT_NAME_MAX]; /* names in the last comment before the points */
-    uint32_t comment_count;
-    prep_text_range range[PREP_TEXT_COLUMNS_MAX];
-    uint32_t mode; /* the usual number of columns */
-} text_sample;
-
-/* "1,5;2,5;3,5" or "1,5 2,5 3,5": what separates is not the comma. */
-static bool has_decimal_commas(const char *p, const char *end)
-{
-    int fields = 0;
-    if (memchr(p, '.', (size_t)(end - p)) != NULL) return false;
-    while (p < end) {
-        while (p < end && (*p == ';' || *p == ' ' || *p == '\t'))
-            p++;
-        const char *start = p;
-        int commas = 0, others = 0;
-        for (; p < end && *p != ';' && *p != ' ' && *p != '\t'; p++) {
-            commas += *p == ',';
-            others += *p != ',' && !isdigit((unsigned char)*p) && *p != '-' && *p != '+';
-        }
-        if (p == start) break;
-        bool is_number =
-            others == 0 && commas == 1 && isdigit((unsigned char)p[-1]) && *start != ',';
-        if (!is_number && (commas > 0 || others > 0)) return false;
-        fields += is_number;
-    }
-    return fields >= 2;
-}
-
-static int popcount(uint64_t v)
-{
-    return __builtin_popcountll(v);
-}
-
-/* Before the first line of numbers: a line of words may name the columns. */
-static bool take_as_names(text_sample *sample, const char *text, const char *end, uint64_t number,
-                          uint32_t columns, uint64_t words)
-{
-    if (sample->count > 0 || sample->name_count > 0 || columns == 0) return false;
-    if ((uint32_t)popcount(words) < (columns <= PREP_TEXT_COLUMNS_MAX ? columns : 1)) return false;
-    sample->name_count = prep_text_split_names(text, end, sample->names);
-    sample->header_line = number;
-    return true;
-}
-
-/* The start of a line as it may be printed. */
-static void quote(const char *text, size_t length, char out[QUOTE_SIZE + 1])
-{
-    size_t n = length < QUOTE_SIZE ? length : QUOTE_SIZE;
-    for (size_t i = 0; i < n; i++)
-        out[i] = text[i] >= ' ' && text[i] < 127 ? text[i] : text[i] == '\t' ? ' ' : '?';
-    out[n] = '\0';
-}
-
-static void take_line(text_sample *sample, const char *text, size_t length, uint64_t number)
-{
-    const char *end = text + length;
-    if (prep_text_is_comment(text, end)) {
-        if (sample->count == 0)
-            sample->comment_count = prep_text_split_names(text, end, sample->comment);
-        return;
-    }
-    uint32_t i = sample->count;
-    uint32_t columns = prep_text_split(text, end, sample->values[i], &sample->words[i]);
-    if (columns == 0) return;
-    if (sample->first_line == 0) {
-        sample->first_line = number;
-        quote(text, length, sample->first);
-    }
-    if (take_as_names(sample, text, end, number, columns, sample->words[i])) return;
-    double count = sample->values[i][0];
-    if (columns == 1 && sample->words[i] == 0 && count >= 0 && count == floor(count) &&
-        (i == 0 || sample->is_counted)) {
-        sample->is_counted = true;
-        sample->count_lines++;
-        if (count < 1e15) sample->counted += (uint64_t)count;
-        return;
-    }
-    sample->decimal_commas += has_decimal_commas(text, end);
-    sample->columns[i] = columns;
-    sample->count++;
-}
-
-static bool take_lines(prep_lines *lines, text_sample *sample, uint32_t limit, bool skip_first,
-                       mospt_err *err)
-{
-    const char *text;
-    size_t length;
-    if (skip_first && !prep_lines_next(lines, &text, &length, err)) return false;
-    for (uint32_t n = 0; n < limit && sample->count < SAMPLE_MAX; n++) {
-        if (!prep_lines_next(lines, &text, &length, err)) return false;
-        if (text == NULL) break;
-        /* the piece of a line that the buffer cut off says nothing */
-        if (lines->in_long_line && lines->begin == lines->end && !lines->is_last) continue;
-        if (lines->number == 1) prep_text_strip_mark(&text, &length);
-        take_line(sample, text, length, lines->number);
-    }
-    return true;
-}
-
-static bool take_sample(prep_scan *scan, text_sample *sample, mospt_err *err)
-{
-    prep_lines lines;
-    uint64_t size = prep_input_size(scan->input);
-    if (!prep_lines_init(&lines, scan->input, LINE_BUFFER_SIZE, 0, err)) return false;
-    bool ok = take_lines(&lines, sample, SAMPLE_HEAD, false, err);
-    bool is_spread =
-        sample->count > 0 && !prep_input_is_gzip(scan->input) && size > 4 * LINE_BUFFER_SIZE;
-    prep_lines_fini(&lines);
-    for (uint64_t k = 1; ok && is_spread && k < SAMPLE_PLACES; k++) {
-        ok = prep_input_seek(scan->input, size / SAMPLE_PLACES * k, err) &&
-             prep_lines_init(&lines, scan->input, 16 * 1024, 0, err);
-        if (!ok) break;
-        ok = take_lines(&lines, sample, SAMPLE_LINES, true, err);
-        prep_lines_fini(&lines);
-    }
-    return ok && prep_input_seek(scan->input, 0, err);
-}
-
-static uint32_t usual_columns(const text_sample *sample)
-{
-    uint32_t votes[PREP_TEXT_COLUMNS_MAX + 2] = {0}, best = 0;
-    for (uint32_t i = 0; i < sample->count; i++)
-        votes[sample->columns[i]]++;
-    for (uint32_t c = 1; c <= PREP_TEXT_COLUMNS_MAX; c++) {
-        if (votes[c] > votes[best]) best = c;
-    }
-    return best;
-}
-
-static void find_range(const text_sample *sample, uint32_t c, prep_text_range *out)
-{
-    uint32_t numbers = 0, words = 0;
-    *out = (prep_text_range){.min = (double)NAN, .max = (double)NAN, .is_integer = true};
-    for (uint32_t i = 0; i < sample->count; i++) {
-        if (sample->columns[i] != sample->mode) continue;
-        bool is_word = sample->words[i] >> c & 1;
-        words += is_word;
-        double v = sample->values[i][c];
-        if (!isfinite(v)) {
-            out->has_gaps = out->has_gaps || !is_word;
-            continue;
-        }
-        numbers++;
-        if (!(v >= out->min)) out->min = v;
-        if (!(v <= out->max)) out->max = v;
-        out->is_integer = out->is_integer && v == floor(v);
-    }
-    out->is_integer = out->is_integer && numbers > 0;
-    out->is_word = words > numbers;
-}
-
 /* What a person would say of lines that are no points. */
-static bool refuse(const prep_scan *scan, const text_sample *sample, mospt_err *err)
+static bool refuse(const prep_scan *scan, const prep_text_sample *sample, mospt_err *err)
 {
     mospt_where at = mospt_at_line(scan->path, sample->first_line);
+    if (sample->fault != NULL) return mospt_err_set(err, MOSPT_EFORMAT, at, "%s", sample->fault);
+    if (sample->first_line == 0)
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(scan->path),
+                             "no lines of numbers: nothing but comments and blank lines");
     if (sample->mode > 0 && sample->mode < 3)
         return mospt_err_set(err, MOSPT_EFORMAT, at, "%u column%s, a point needs x, y and z",
                              sample->mode, sample->mode == 1 ? "" : "s");
     return mospt_err_set(err, MOSPT_EFORMAT, at, "not lines of numbers: `%s`", sample->first);
 }
 
-static bool check_sample(const prep_scan *scan, const text_sample *sample, bool has_names,
+/* Line ends and numbers as other machines and countries write them. */
+static bool check_customs(const prep_scan *scan, const prep_text_sample *sample, mospt_err *err)
+{
+    mospt_where at = mospt_at_line(scan->path, sample->first_line);
+    if (sample->split_lines * 2 > sample->count)
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "lines that end with CR alone, as on old Macintoshes, are not read; "
+                             "write them with LF or CR LF");
+    if (sample->decimal_commas * 4 > sample->count)
+        return mospt_err_set(err, MOSPT_EFORMAT, at,
+                             "decimal commas are not read; write the numbers with points");
+    return true;
+}
+
+static bool check_sample(const prep_scan *scan, const prep_text_sample *sample, bool has_names,
                          mospt_err *err)
 {
     if (sample->count_lines > 1 && sample->count == 0)
@@ -212,32 +54,53 @@ static bool check_sample(const prep_scan *scan, const text_sample *sample, bool 
     if (sample->count == 0 && (has_names || sample->is_counted))
         return mospt_err_set(err, MOSPT_EEMPTY, mospt_at_file(scan->path),
                              "the text file holds no points");
-    if (sample->count == 0) return refuse(scan, sample, err);
-    if (sample->decimal_commas * 2 > sample->count)
-        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->first_line),
-                             "decimal commas are not read; write the numbers with points");
-    return true;
+    return sample->count > 0 || refuse(scan, sample, err);
+}
+
+static bool is_point(const prep_text_sample *sample, uint32_t i, const prep_text_plan *plan)
+{
+    return sample->columns[i] >= plan->needed && sample->columns[i] <= PREP_TEXT_COLUMNS_MAX &&
+           (sample->words[i] & plan->needed_mask) == 0;
+}
+
+/* Lines above the first point that are words for the most part: a title, a date, units.
+ * returns  how many */
+static uint32_t find_titles(const prep_text_sample *sample, prep_text_plan *plan)
+{
+    uint32_t n = 0;
+    for (; n < sample->count && !is_point(sample, n, plan); n++) {
+        uint32_t words = (uint32_t)__builtin_popcountll(sample->words[n]);
+        if (words == 0 || 2 * words < sample->columns[n]) break;
+        if (sample->line[n] > plan->header_line) plan->header_line = sample->line[n];
+    }
+    return n < sample->count ? n : 0;
 }
 
 /* Most lines must be points; one may always be something else, such as the last one of a file that
  * was cut. */
-static bool check_share(const prep_scan *scan, const text_sample *sample, const text_state *text,
+static bool check_share(const prep_scan *scan, const prep_text_sample *sample, text_state *text,
                         mospt_err *err)
 {
-    const prep_text_plan *plan = &text->blocks.plan;
-    uint32_t good = 0;
-    for (uint32_t i = 0; i < sample->count; i++) {
-        bool ok = sample->columns[i] >= plan->needed &&
-                  sample->columns[i] <= PREP_TEXT_COLUMNS_MAX &&
-                  (sample->words[i] & plan->needed_mask) == 0;
-        good += ok;
+    prep_text_plan *plan = &text->blocks.plan;
+    uint32_t first = find_titles(sample, plan), bad = 0, bad_at = 0;
+    for (uint32_t i = sample->count; i-- > first;) {
+        if (is_point(sample, i, plan)) continue;
+        bad++;
+        bad_at = i;
     }
-    uint32_t bad = sample->count - good;
-    return (good > 0 && (bad <= 1 || bad * 20 <= sample->count)) || refuse(scan, sample, err);
+    uint32_t all = sample->count - first;
+    if (bad < all && (bad <= 1 || bad * 20 <= all)) return true;
+    if (bad == all || sample->fault != NULL) return refuse(scan, sample, err);
+    return mospt_err_set(err, MOSPT_EFORMAT,
+                         sample->line[bad_at] > 0 ? mospt_at_line(scan->path, sample->line[bad_at])
+                                                  : mospt_at_file(scan->path),
+                         "%u of %u lines that were looked at are no points of %u columns", bad, all,
+                         plan->needed);
 }
 
 static bool columns_from_option(const prep_scan *scan, const char *option,
-                                const text_sample *sample, prep_text_columns *out, mospt_err *err)
+                                const prep_text_sample *sample, prep_text_columns *out,
+                                mospt_err *err)
 {
     char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
     uint32_t count = prep_text_split_names(option, option + strlen(option), names);
@@ -250,7 +113,7 @@ static bool columns_from_option(const prep_scan *scan, const char *option,
     return true;
 }
 
-static bool columns_from_names(const prep_scan *scan, const text_sample *sample,
+static bool columns_from_names(const prep_scan *scan, const prep_text_sample *sample,
                                prep_text_columns *out, bool *is_title, mospt_err *err)
 {
     char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
@@ -260,32 +123,33 @@ static bool columns_from_names(const prep_scan *scan, const text_sample *sample,
     /* words that do not go with the columns are a title, not their names */
     *is_title = sample->count > 0 && sample->name_count != sample->mode && sample->mode >= 3;
     return *is_title ||
-           mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->header_line),
+           mospt_err_set(err, MOSPT_EFORMAT, mospt_at_line(scan->path, sample->first_line),
                          "neither points nor names of columns with x, y and z: `%s`",
                          sample->first);
 }
 
-static bool understand_columns(prep_scan *scan, text_sample *sample, const char *option,
+static bool understand_columns(prep_scan *scan, prep_text_sample *sample, const char *option,
                                text_state *text, mospt_err *err)
 {
     prep_text_plan *plan = &text->blocks.plan;
     prep_text_columns *columns = &text->columns;
     bool has_names = sample->name_count > 0, is_title = false;
-    sample->mode = usual_columns(sample);
-    for (uint32_t c = 0; c < sample->mode; c++)
-        find_range(sample, c, &sample->range[c]);
+    prep_text_sample_measure(sample);
+    if (sample->count > 0 && !check_customs(scan, sample, err)) return false;
     if (has_names && option == NULL) {
         if (!columns_from_names(scan, sample, columns, &is_title, err)) return false;
         has_names = !is_title;
     }
     if (!check_sample(scan, sample, has_names, err)) return false;
-    plan->header_line = is_title ? 0 : sample->header_line;
+    plan->header_line = sample->header_line;
     if (option != NULL) return columns_from_option(scan, option, sample, columns, err);
     if (has_names) return true;
     if (sample->mode < 3) return refuse(scan, sample, err);
     if (sample->comment_count == sample->mode &&
         prep_text_columns_from_names(sample->comment, sample->comment_count, columns))
         return true;
+    for (uint32_t c = 0; c < sample->mode && sample->count == 1; c++)
+        sample->range[c].is_word = false; /* a single line with a word is a note, not a point */
     if (!prep_text_columns_from_extension(scan->path, sample->mode, columns))
         prep_text_columns_guess(sample->range, sample->mode, columns);
     return true;
@@ -355,7 +219,7 @@ static void add_shown_colour(prep_scan *scan, text_state *text)
                                .name = "colour"};
 }
 
-static void add_colour(prep_scan *scan, text_state *text, const text_sample *sample)
+static void add_colour(prep_scan *scan, text_state *text, const prep_text_sample *sample)
 {
     prep_text_plan *plan = &text->blocks.plan;
     double low = 0, max = 0;
@@ -378,15 +242,16 @@ static void add_colour(prep_scan *scan, text_state *text, const text_sample *sam
     else add_shown_colour(scan, text);
 }
 
-static bool add_intensity(prep_scan *scan, text_state *text, const text_sample *sample,
+static bool add_intensity(prep_scan *scan, text_state *text, const prep_text_sample *sample,
                           mospt_err *err)
 {
     prep_text_plan *plan = &text->blocks.plan;
-    double *values = malloc(SAMPLE_MAX * sizeof *values);
-    if (values == NULL) return mospt_err_nomem(err, SAMPLE_MAX * sizeof *values);
+    double *values = malloc(PREP_TEXT_SAMPLE_MAX * sizeof *values);
+    if (values == NULL) return mospt_err_nomem(err, PREP_TEXT_SAMPLE_MAX * sizeof *values);
     size_t n = 0;
     for (uint32_t i = 0; i < sample->count; i++) {
-        if (sample->columns[i] == sample->mode) values[n++] = sample->values[i][plan->intensity];
+        if (prep_text_sample_tells(sample, i, (uint32_t)plan->intensity))
+            values[n++] = sample->values[i][plan->intensity];
     }
     plan->tone = prep_tone_make(values, n);
     free(values);
@@ -407,7 +272,7 @@ static void find_three(const prep_text_columns *columns, prep_text_meaning first
     if (!is_whole) out[0] = out[1] = out[2] = -1;
 }
 
-static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sample,
+static bool make_planes(prep_scan *scan, text_state *text, const prep_text_sample *sample,
                         mospt_err *err)
 {
     prep_text_plan *plan = &text->blocks.plan;
@@ -426,11 +291,13 @@ static bool make_planes(prep_scan *scan, text_state *text, const text_sample *sa
         mospt_type type = fit_type(&sample->range[c], columns->column[c].type, false);
         add_target(scan, text, columns->column[c].name, type, &column, 1);
     }
+    for (uint32_t k = 0; k < plan->target_count; k++)
+        plan->target[k].is_optional = plan->target[k].column >= plan->needed;
     return true;
 }
 
 /* Columns of labels cannot be kept; columns at the end of the names that no line has are none. */
-static void find_needed(text_state *text, const text_sample *sample)
+static void find_needed(text_state *text, const prep_text_sample *sample)
 {
     prep_text_plan *plan = &text->blocks.plan;
     prep_text_columns *columns = &text->columns;
@@ -444,11 +311,27 @@ static void find_needed(text_state *text, const text_sample *sample)
     }
 }
 
-static bool understand(prep_scan *scan, text_sample *sample, const char *option, text_state *text,
-                       mospt_err *err)
+/* Columns that the lines of some blocks do not have. */
+static void find_optional(text_state *text, const prep_text_sample *sample)
+{
+    prep_text_plan *plan = &text->blocks.plan;
+    uint32_t votes[PREP_TEXT_COLUMNS_MAX + 2], least = 0;
+    plan->known = plan->needed;
+    prep_text_sample_count(sample, votes);
+    for (int m = PREP_TEXT_X; m <= PREP_TEXT_Z; m++) {
+        int column = prep_text_columns_find(&text->columns, (prep_text_meaning)m);
+        if (column >= (int)least) least = (uint32_t)column + 1;
+    }
+    for (uint32_t c = plan->needed; sample->is_counted && c-- > least;)
+        if (prep_text_sample_is_share(sample, votes[c])) plan->needed = c;
+}
+
+static bool understand(prep_scan *scan, prep_text_sample *sample, const char *option,
+                       text_state *text, mospt_err *err)
 {
     if (!understand_columns(scan, sample, option, text, err)) return false;
     find_needed(text, sample);
+    find_optional(text, sample);
     if (!check_share(scan, sample, text, err)) return false;
     for (int m = PREP_TEXT_X; m <= PREP_TEXT_Z; m++) {
         if (prep_text_columns_find(&text->columns, (prep_text_meaning)m) < 0)
@@ -471,12 +354,12 @@ static bool text_open(prep_scan *scan, uint32_t index, const prep_scan_options *
     text_state *text = calloc(1, sizeof *text);
     if (text == NULL) return mospt_err_nomem(err, sizeof *text);
     scan->state = text;
-    text_sample *sample = calloc(1, sizeof *sample);
+    prep_text_sample *sample = calloc(1, sizeof *sample);
     if (sample == NULL) return mospt_err_nomem(err, sizeof *sample);
-    sample->values = malloc((SAMPLE_MAX + 1) * sizeof *sample->values);
-    bool ok =
-        sample->values != NULL || mospt_err_nomem(err, (SAMPLE_MAX + 1) * sizeof *sample->values);
-    ok = ok && take_sample(scan, sample, err) &&
+    sample->values = malloc((PREP_TEXT_SAMPLE_MAX + 1) * sizeof *sample->values);
+    bool ok = sample->values != NULL ||
+              mospt_err_nomem(err, (PREP_TEXT_SAMPLE_MAX + 1) * sizeof *sample->values);
+    ok = ok && prep_text_sample_take(sample, scan->input, err) &&
          understand(scan, sample, options->columns, text, err);
     free(sample->values);
     free(sample);

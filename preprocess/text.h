@@ -21,6 +21,10 @@ enum { PREP_TEXT_COLUMNS_MAX = 64, PREP_TEXT_NAME_MAX = 48 };
  * returns  the number of columns; PREP_TEXT_COLUMNS_MAX + 1 if there are more than that */
 uint32_t prep_text_split(const char *text, const char *end, double *values, uint64_t *words);
 
+/* Whether a line is written with decimal commas: "1,5;2,5;3" or "1,5 2,5 3,5" or "\"1,5\",\"2,5\"".
+ */
+bool prep_text_has_decimal_commas(const char *text, const char *end);
+
 /* The same line as names: at commas, semicolons or tabs if it has any, else at blanks; quotes and a
  * leading comment mark are taken off. */
 uint32_t prep_text_split_names(const char *text, const char *end, char names[][PREP_TEXT_NAME_MAX]);
@@ -72,10 +76,60 @@ typedef struct {
 /* Meanings from the number of columns and the range of their values. */
 void prep_text_columns_guess(const prep_text_range *ranges, uint32_t count, prep_text_columns *out);
 
+enum {
+    PREP_TEXT_SAMPLE_MAX = 2048,
+    PREP_TEXT_QUOTE_SIZE = 60, /* of a line, in a message */
+};
+
+/* The lines that are looked at before the columns are understood: those of the start, and some from
+ * all over the file. */
+typedef struct {
+    double (*values)[PREP_TEXT_COLUMNS_MAX]; /* [PREP_TEXT_SAMPLE_MAX], owned */
+    uint64_t words[PREP_TEXT_SAMPLE_MAX];
+    uint64_t line[PREP_TEXT_SAMPLE_MAX]; /* 0: not known */
+    bool is_behind_head;
+    const char *fault; /* why the data end early; NULL: they do not */
+    uint32_t columns[PREP_TEXT_SAMPLE_MAX];
+    uint32_t count;
+    uint32_t decimal_commas; /* lines that have them */
+    uint32_t split_lines;    /* lines with the line ends of old Macintoshes in them */
+    bool is_counted;         /* the first line of numbers is a single integer */
+    uint64_t counted;        /* points announced in the lines looked at */
+    uint32_t count_lines;
+    char first[PREP_TEXT_QUOTE_SIZE + 1]; /* start of the first line that is no comment */
+    uint64_t first_line, header_line;
+    char names[PREP_TEXT_COLUMNS_MAX][PREP_TEXT_NAME_MAX];
+    uint32_t name_count;
+    char comment[PREP_TEXT_COLUMNS_MAX]
+                [PREP_TEXT_NAME_MAX]; /* names in the last comment before the points */
+    uint32_t comment_count;
+    prep_text_range range[PREP_TEXT_COLUMNS_MAX];
+    uint32_t mode; /* the usual number of columns */
+} prep_text_sample;
+
+/* Looks at the lines, and goes back to the start.
+ * sample   zeroed, with room for values
+ * errors   MOSPT_EIO, MOSPT_ENOMEM */
+bool prep_text_sample_take(prep_text_sample *sample, prep_input *input, mospt_err *err);
+
+/* Finds the usual number of columns, and the range of each. */
+void prep_text_sample_measure(prep_text_sample *sample);
+
+/* Lines of so many columns. */
+void prep_text_sample_count(const prep_text_sample *sample,
+                            uint32_t lines[PREP_TEXT_COLUMNS_MAX + 2]);
+
+/* Whether so many lines are one in twenty, and not just the last one of a file that was cut. */
+bool prep_text_sample_is_share(const prep_text_sample *sample, uint32_t lines);
+
+/* Whether a line tells of a column: one that is broken does not, one of another block does. */
+bool prep_text_sample_tells(const prep_text_sample *sample, uint32_t line, uint32_t column);
+
 /* Where the values of a column go in a batch, and what they were in the sample. */
 typedef struct {
     uint32_t column, plane, component;
-    bool is_shown; /* colour of bytes: it is in the batch already, and only checked here */
+    bool is_shown;    /* colour of bytes: it is in the batch already, and only checked here */
+    bool is_optional; /* lines may end before it */
     mospt_type type;
     double low, high; /* what `type` holds, and the sample held */
     bool is_integer;
@@ -85,8 +139,9 @@ typedef struct {
 /* How lines become points. */
 typedef struct {
     uint32_t needed;      /* columns that a line must have */
+    uint32_t known;       /* columns in use; lines of another block may have fewer (PTS) */
     uint64_t needed_mask; /* those of them that must be no word */
-    uint64_t header_line; /* number of the line with the names; 0: there is none */
+    uint64_t header_line; /* number of the last line of names, units and titles; 0: there is none */
     bool has_counts;      /* lines with a single integer announce how many points follow (PTS) */
     int xyz[3], rgb[3], intensity; /* columns, -1: there is none */
     double rgb_scale;              /* raw to 0..255; 0: no colour */
@@ -122,7 +177,7 @@ bool prep_text_blocks_next(prep_text_blocks *blocks, prep_input *input, prep_tex
                            mospt_err *err);
 void prep_text_blocks_stop(prep_text_blocks *blocks);
 
-/* A comment, which may start with blanks. */
+/* A comment, which may start with blanks, or the mark that DOS puts at the end of a file. */
 bool prep_text_is_comment(const char *text, const char *end);
 
 /* Takes the mark off that some programs put in front of UTF-8. */

@@ -1,5 +1,6 @@
 #include "preprocess/text.h"
 
+#include <ctype.h>
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,12 @@ bool prep_text_is_comment(const char *text, const char *end)
     const char *p = text;
     while (p < end && (*p == ' ' || *p == '\t'))
         p++;
-    return p < end && (*p == '#' || *p == '%' || (*p == '/' && p + 1 < end && p[1] == '/'));
+    if (p == end) return false;
+    /* a semicolon may as well stand behind an empty column */
+    if (*p == ';')
+        return p + 1 == end || ((p[1] == ' ' || p[1] == ';' || isalpha((unsigned char)p[1])) &&
+                                memchr(p + 2, ';', (size_t)(end - p - 2)) == NULL);
+    return *p == '#' || *p == '%' || *p == 26 || (*p == '/' && p + 1 < end && p[1] == '/');
 }
 
 void prep_text_strip_mark(const char **text, size_t *length)
@@ -25,7 +31,7 @@ static bool fits(const prep_text_target *t, double value)
 {
     if (!t->is_integer) return !(fabs(value) > t->high) || isinf(value);
     return (value >= t->low && value <= t->high && value == (double)(int64_t)value) ||
-           (t->is_shown && isnan(value));
+           ((t->is_shown || t->is_optional) && isnan(value));
 }
 
 /* The types were chosen from a sample; what it did not show must not be lost without a word. */
@@ -51,12 +57,12 @@ static void store(const prep_text_plan *plan, const double *values, uint64_t lin
     uint8_t *rgbi = batch->rgbi + 4 * i;
     for (int a = 0; a < 3; a++)
         batch->xyz[3 * i + (size_t)a] = values[plan->xyz[a]];
-    memset(rgbi,
-           plan->intensity >= 0 && !plan->tone.is_flat
-               ? prep_tone_apply(&plan->tone, values[plan->intensity])
-               : 255,
-           4);
-    if (plan->rgb_scale > 0) {
+    bool has_tone = plan->intensity >= 0 && !plan->tone.is_flat &&
+                    !(plan->intensity >= (int)plan->needed && isnan(values[plan->intensity]));
+    memset(rgbi, has_tone ? prep_tone_apply(&plan->tone, values[plan->intensity]) : 255, 4);
+    bool has_colour =
+        plan->rgb_scale > 0 && !(plan->rgb[0] >= (int)plan->needed && isnan(values[plan->rgb[0]]));
+    if (has_colour) {
         prep_scale scale = {.scale = plan->rgb_scale};
         for (int c = 0; c < 3; c++)
             rgbi[c] = prep_scale_apply(&scale, values[plan->rgb[c]]);
@@ -116,10 +122,11 @@ static bool parse(const void *context, void *memory, mospt_err *err)
         double values[PREP_TEXT_COLUMNS_MAX];
         uint64_t words;
         if (cursor.number == 1) prep_text_strip_mark(&line, &length);
-        if (cursor.number == plan->header_line || prep_text_is_comment(line, line + length))
-            continue;
+        if (prep_text_is_comment(line, line + length)) continue;
         uint32_t columns = prep_text_split(line, line + length, values, &words);
-        if (columns == 0) continue;
+        if (columns == 0 || (cursor.number <= plan->header_line && words != 0)) continue;
+        for (uint32_t c = columns; c < plan->known; c++)
+            values[c] = (double)NAN;
         bool is_point = columns >= plan->needed && columns <= PREP_TEXT_COLUMNS_MAX &&
                         (words & plan->needed_mask) == 0;
         if (is_point) store(plan, values, cursor.number, block);

@@ -36,6 +36,43 @@ static const char *skip_word(const char *p, const char *end)
     return p;
 }
 
+/* "12,5" or "-0,25e3", which is one number to whoever wrote it. */
+static bool is_decimal_comma(const char *p, const char *end)
+{
+    p += p < end && (*p == '-' || *p == '+');
+    for (int part = 0; part < 2; part++) {
+        const char *start = p;
+        while (p < end && isdigit((unsigned char)*p))
+            p++;
+        if (p == start || (part == 0 && (p == end || *p != ','))) return false;
+        p += part == 0;
+    }
+    return p == end || (*p | 32) == 'e';
+}
+
+bool prep_text_has_decimal_commas(const char *p, const char *end)
+{
+    size_t length = (size_t)(end - p);
+    bool is_quoted = memchr(p, '"', length) != NULL, all = true;
+    const char *marks = is_quoted ? "\"" : memchr(p, ';', length) != NULL ? ";" : " \t";
+    int fields = 0, decimal = 0;
+    for (const char *stop; p < end; p = stop + (stop < end)) {
+        for (stop = p; stop < end && strchr(marks, *stop) == NULL;)
+            stop++;
+        const char *first = skip_blanks(p, stop), *last = stop;
+        while (last > first && is_blank(last[-1]))
+            last--;
+        bool is_between = is_quoted && last - first == 1 && is_separator(*first);
+        if (first == last || is_between) continue;
+        bool has_comma = memchr(first, ',', (size_t)(last - first)) != NULL;
+        if (has_comma && !is_decimal_comma(first, last)) return false;
+        fields++;
+        decimal += has_comma;
+        all = all && has_comma;
+    }
+    return decimal > 0 && (fields > 2 || (all && fields > 1));
+}
+
 /* A column that is no plain number: empty, quoted, or a word. */
 static const char *take_odd_column(const char *p, const char *end, double *value, bool *is_word)
 {
@@ -71,6 +108,7 @@ uint32_t prep_text_split(const char *text, const char *end, double *values, uint
         }
         const char *q = prep_number_parse(p, end, &values[n]);
         if (q == NULL || (q < end && !is_separator(*q))) {
+            if (prep_text_is_comment(p, end)) break;
             bool is_word = false;
             q = take_odd_column(p, end, &values[n], &is_word);
             if (is_word) mask |= 1ull << n;
@@ -339,6 +377,18 @@ static bool are_bytes(const prep_text_range *r, uint32_t first)
     return true;
 }
 
+/* Colours of 16 bits, or shares of 1. */
+static bool are_wide(const prep_text_range *r, uint32_t first)
+{
+    bool words = true, shares = true;
+    for (uint32_t c = first; c < first + 3; c++) {
+        if (!(r[c].min >= 0) || !(r[c].max > r[c].min)) return false;
+        words = words && r[c].is_integer && r[c].max > 255 && r[c].max <= 65535;
+        shares = shares && !r[c].is_integer && r[c].max <= 1;
+    }
+    return words || shares;
+}
+
 /* Components of unit vectors, written with a few digits. */
 static bool are_units(const prep_text_range *r, uint32_t first)
 {
@@ -355,33 +405,45 @@ static void set_run(prep_text_columns *columns, uint32_t first, prep_text_meanin
         columns->column[first + k].meaning = (prep_text_meaning)((uint32_t)meaning + k);
 }
 
-void prep_text_columns_guess(const prep_text_range *r, uint32_t count, prep_text_columns *out)
+/* A label before the numbers and any behind them are no columns of theirs. */
+static void leave_out_labels(const prep_text_range *ranges, uint32_t *first, uint32_t *end)
 {
-    *out = (prep_text_columns){.count = count};
-    for (uint32_t c = 3; c < count; c++) {
+    while (*end > *first + 3 && ranges[*end - 1].is_word)
+        --*end;
+    *first += *end > *first + 3 && ranges[*first].is_word;
+}
+
+void prep_text_columns_guess(const prep_text_range *ranges, uint32_t count, prep_text_columns *out)
+{
+    uint32_t first = 0, end = count;
+    leave_out_labels(ranges, &first, &end);
+    const prep_text_range *r = ranges + first;
+    count = end - first;
+    *out = (prep_text_columns){.count = end};
+    for (uint32_t c = first + 3; c < end; c++) {
         char name[PREP_TEXT_NAME_MAX];
         snprintf(name, sizeof name, "column_%u", c + 1);
         set_attribute(out, c, name);
     }
-    set_run(out, 0, PREP_TEXT_X, 3);
+    set_run(out, first, PREP_TEXT_X, 3);
     if (count == 4) {
-        set_run(out, 3, PREP_TEXT_INTENSITY, 1);
-    } else if (count == 6 && are_bytes(r, 3)) {
-        set_run(out, 3, PREP_TEXT_R, 3);
+        set_run(out, first + 3, PREP_TEXT_INTENSITY, 1);
+    } else if (count == 6 && (are_bytes(r, 3) || are_wide(r, 3))) {
+        set_run(out, first + 3, PREP_TEXT_R, 3);
     } else if (count == 6 && are_units(r, 3)) {
-        set_run(out, 3, PREP_TEXT_NX, 3);
-    } else if (count == 7 && are_bytes(r, 4)) {
-        set_run(out, 3, PREP_TEXT_INTENSITY, 1);
-        set_run(out, 4, PREP_TEXT_R, 3);
-    } else if (count == 7 && are_bytes(r, 3)) {
-        set_run(out, 3, PREP_TEXT_R, 3);
-        set_run(out, 6, PREP_TEXT_INTENSITY, 1);
+        set_run(out, first + 3, PREP_TEXT_NX, 3);
+    } else if (count == 7 && (are_bytes(r, 4) || (!are_bytes(r, 3) && are_wide(r, 4)))) {
+        set_run(out, first + 3, PREP_TEXT_INTENSITY, 1);
+        set_run(out, first + 4, PREP_TEXT_R, 3);
+    } else if (count == 7 && (are_bytes(r, 3) || are_wide(r, 3))) {
+        set_run(out, first + 3, PREP_TEXT_R, 3);
+        set_run(out, first + 6, PREP_TEXT_INTENSITY, 1);
     } else if (count == 9 && are_bytes(r, 3) && are_units(r, 6)) {
-        set_run(out, 3, PREP_TEXT_R, 3);
-        set_run(out, 6, PREP_TEXT_NX, 3);
+        set_run(out, first + 3, PREP_TEXT_R, 3);
+        set_run(out, first + 6, PREP_TEXT_NX, 3);
     } else if (count == 10 && are_bytes(r, 4) && are_units(r, 7)) {
-        set_run(out, 3, PREP_TEXT_INTENSITY, 1);
-        set_run(out, 4, PREP_TEXT_R, 3);
-        set_run(out, 7, PREP_TEXT_NX, 3);
+        set_run(out, first + 3, PREP_TEXT_INTENSITY, 1);
+        set_run(out, first + 4, PREP_TEXT_R, 3);
+        set_run(out, first + 7, PREP_TEXT_NX, 3);
     }
 }

@@ -188,12 +188,37 @@ static void a_pipe_does_not_stop_us(void **state)
     unlink(path);
 }
 
+static void files_of_one_name_are_told_apart(void **state)
+{
+    (void)state;
+    char paths[3][1024], deep[1100];
+    static const char *const folders[] = {"d1/s", "d2/s", "d2/t"};
+    make_folder("d1");
+    make_folder("d2");
+    for (int i = 0; i < 3; i++) {
+        make_folder(folders[i]);
+        snprintf(paths[i], sizeof paths[i], "%s/%s", root, folders[i]);
+        snprintf(deep, sizeof deep, "%s/one.xyz", folders[i]);
+        put_text(deep, "1 2 3\n");
+    }
+    put_text("d2/t/two.xyz", "1 2 3\n");
+    const char *const named[] = {paths[0], paths[1], paths[2]};
+    static const char *const names[] = {"d1/s/one.xyz", "d2/s/one.xyz", "t/one.xyz", "two.xyz"};
+    prep_folder_list list;
+    list_paths(named, 3, &list);
+    check_names(list.files, list.count, names, 4);
+    for (size_t i = 0; i < list.count; i++)
+        assert_non_null(strstr(list.files[i].path, list.files[i].name));
+    prep_folder_list_fini(&list);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_folder_is_listed_in_order),
         cmocka_unit_test(a_named_file_is_always_taken),
         cmocka_unit_test(the_same_file_comes_once),
+        cmocka_unit_test(files_of_one_name_are_told_apart),
         cmocka_unit_test(what_does_not_exist_is_an_error),
         cmocka_unit_test(nothing_is_an_empty_list),
         cmocka_unit_test(a_pipe_does_not_stop_us),

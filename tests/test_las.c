@@ -545,9 +545,111 @@ static void unusable_coordinates_are_dropped_and_counted(void **state)
     scan_points_fini(&p);
 }
 
+/* Puts a variable length record between header and points. Takes `bytes`. */
+static uint8_t *add_record(uint8_t *bytes, size_t *size, uint16_t id, const void *payload,
+                           size_t payload_size)
+{
+    size_t header = 227, record = 54 + payload_size;
+    uint8_t *out = calloc(1, *size + record);
+    memcpy(out, bytes, header);
+    memcpy(out + header + 2, "LASF_Projection", 15);
+    write_las_u16(out + header + 18, id);
+    write_las_u16(out + header + 20, (uint32_t)payload_size);
+    memcpy(out + header + 54, payload, payload_size);
+    memcpy(out + header + record, bytes + header, *size - header);
+    write_las_u32(out + 96, (uint32_t)(out[96] | out[97] << 8) + (uint32_t)record);
+    write_las_u32(out + 100, out[100] + 1u);
+    *size += record;
+    free(bytes);
+    return out;
+}
+
+static void check_crs(uint8_t *bytes, size_t size, const char *expected)
+{
+    scan_points p;
+    read_bytes(bytes, size, &p);
+    assert_string_equal(p.info.crs, expected);
+    assert_int_equal(p.count, plain.count);
+    scan_points_fini(&p);
+    free(bytes);
+}
+
+static void the_reference_system_is_kept(void **state)
+{
+    (void)state;
+    static const char wkt[] = "PROJCS[\"a b\",\r\n    GEOGCS[\"c\"]]\r\n";
+    static const char text[] = "Some system|NAD83 / UTM zone 10N|";
+    static const uint16_t coded[] = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 25832};
+    static const uint16_t named[] = {1,  1, 0,    4,     1024, 0,  1,    1, 1026, 34737,
+                                     12, 0, 3073, 34737, 21,   12, 3072, 0, 1,    32767};
+    static const uint16_t beyond[] = {1, 1, 0, 1, 1026, 34737, 60000, 65000};
+    size_t size;
+    uint8_t *bytes = write_las(&plain, &size);
+    bytes = add_record(bytes, &size, 2112, wkt, sizeof wkt);
+    check_crs(bytes, size, "PROJCS[\"a b\", GEOGCS[\"c\"]]");
+    bytes = write_las(&plain, &size);
+    bytes = add_record(bytes, &size, 34735, coded, sizeof coded);
+    check_crs(bytes, size, "EPSG:25832");
+    const struct {
+        const uint16_t *keys;
+        size_t size;
+        const char *expected;
+    } texts[] = {{named, sizeof named, "NAD83 / UTM zone 10N"}, {beyond, sizeof beyond, ""}};
+    for (int i = 0; i < 2; i++) {
+        bytes = write_las(&plain, &size);
+        bytes = add_record(bytes, &size, 34737, text, sizeof text);
+        bytes = add_record(bytes, &size, 34735, texts[i].keys, texts[i].size);
+        check_crs(bytes, size, texts[i].expected);
+    }
+}
+
+static void the_step_divides_all_three_scales(void **state)
+{
+    (void)state;
+    static const double scales[][4] = {{0.001, 0.001, 0.001, 0.001},
+                                       {0.001, 0.01, 0.0005, 0.0005},
+                                       {0.001, 0.0025, 0.01, 0.0005},
+                                       {1e-7, 1e-7, 0.001, 1e-7},
+                                       {0.001, 0.00314159, 0.001, 0}};
+    for (size_t k = 0; k < sizeof scales / sizeof scales[0]; k++) {
+        scan_points p;
+        write_las_options o = plain;
+        memcpy(o.scale, scales[k], sizeof o.scale);
+        read_made(&o, &p);
+        assert_true(fabs(p.info.step - scales[k][3]) < 1e-12);
+        scan_points_fini(&p);
+    }
+}
+
+static void points_that_the_header_does_not_claim_are_told(void **state)
+{
+    (void)state;
+    size_t size;
+    scan_points p;
+    uint8_t *bytes = write_las(&plain, &size);
+    write_las_u32(bytes + 107, plain.count - 20);
+    read_bytes(bytes, size, &p);
+    assert_int_equal(p.count, plain.count - 20);
+    assert_true(p.is_damaged);
+    assert_non_null(strstr(p.damage.message, "room for 20 more"));
+    assert_int_equal(p.damage.place, size - 20 * 26);
+    scan_points_fini(&p);
+    read_bytes(bytes, size - 5, &p); /* whatever that is, it is no points */
+    assert_false(p.is_damaged);
+    scan_points_fini(&p);
+    write_las_u32(bytes + 107, 0);
+    mospt_err err = refuse_bytes(bytes, size - 5);
+    assert_int_equal(err.code, MOSPT_EFORMAT);
+    assert_non_null(strstr(err.message, "room for 299"));
+    free(bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_reference_system_is_kept),
+        cmocka_unit_test(the_step_divides_all_three_scales),
+        cmocka_unit_test(points_that_the_header_does_not_claim_are_told),
         cmocka_unit_test(every_version_and_point_format_is_read),
         cmocka_unit_test(attribute_types_are_those_of_the_format),
         cmocka_unit_test(the_header_gives_step_offset_and_bounds),

@@ -442,10 +442,43 @@ static void gzip_is_unpacked_on_the_way(void **state)
     }
 }
 
+/* Small enough that the lists and the vertices are in memory together. */
+static void lists_may_come_before_vertices_without_any(void **state)
+{
+    (void)state;
+    for (int e = 0; e < 3; e++) {
+        ply_file f;
+        scan_points p;
+        start(&f, (prep_ply_encoding)e,
+              "element face 7\nproperty list uchar int vertex_indices\n"
+              "element vertex 100\nproperty float x\nproperty float y\nproperty float z\n"
+              "property ushort red\nproperty ushort green\nproperty ushort blue\n");
+        for (int i = 0; i < 7; i++) {
+            add(&f, MOSPT_U8, 3);
+            for (int k = 0; k < 3; k++)
+                add(&f, MOSPT_I32, k + i);
+            end_row(&f);
+        }
+        for (int i = 0; i < 100; i++) {
+            for (int k = 0; k < 3; k++)
+                add(&f, MOSPT_F32, i + k);
+            for (int k = 0; k < 3; k++)
+                add(&f, MOSPT_U16, i == 99 ? 65535 : i);
+            end_row(&f);
+        }
+        read_file(&f, &p);
+        assert_int_equal(p.count, 100);
+        assert_true(p.xyz[0] == 0 && p.xyz[3 * 99 + 2] == 101);
+        assert_int_equal(p.rgbi[4 * 99], 255);
+        scan_points_fini(&p);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_encodings_give_the_same_points),
+        cmocka_unit_test(lists_may_come_before_vertices_without_any),
         cmocka_unit_test(colours_of_16_bits_keep_their_raw_values),
         cmocka_unit_test(colours_come_in_many_ways),
         cmocka_unit_test(sloppy_headers_are_read),

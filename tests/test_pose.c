@@ -49,6 +49,17 @@ static void a_sidecar_is_found_by_both_names(void **state)
     }
 }
 
+static void a_sidecar_may_have_comments(void **state)
+{
+    (void)state;
+    double m[16];
+    bool found;
+    mospt_err err;
+    write_text("a.pose.txt", "\xef\xbb\xbf# of station 5\r\n1 0 0 5 # x\r\n0 1 0 6\r\n0 0 1 7\r\n");
+    CORE_NEED(find(NULL, "a.las", &found, m, &err));
+    assert_true(found && m[3] == 5 && m[7] == 6 && m[11] == 7 && m[15] == 1);
+}
+
 static void what_is_no_matrix_is_refused(void **state)
 {
     (void)state;
@@ -89,6 +100,15 @@ static void a_list_names_files_and_scans(void **state)
     CORE_NEED(find(&list, "other.las", &found, m, &err));
     assert_true(found && m[3] == 3);
     prep_pose_list_fini(&list);
+
+    write_text("poses.txt", "\xef\xbb\xbfs2/a 1 0 0 7 0 1 0 0 0 0 1 0\n");
+    CORE_NEED(prep_pose_list_read(path, &list, &err));
+    static const char *const paths[] = {"x/s2/a.las", "s2/a.las", "s1/a.las", "xs2/a.las", "a.las"};
+    for (int i = 0; i < 5; i++) {
+        CORE_NEED(prep_pose_find(&list, paths[i], "a.las", &found, m, &err));
+        assert_int_equal(found, i < 2);
+    }
+    prep_pose_list_fini(&list);
     write_text("poses.txt", "b 1 0 0 1 0 1 0 0 0 0 1 0\nc 1 2\n");
     CORE_FAILS(prep_pose_list_read(path, &list, &err), MOSPT_EFORMAT);
     assert_int_equal(err.place, 2);
@@ -128,6 +148,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_sidecar_is_found_by_both_names, make_folder,
                                         remove_folder),
+        cmocka_unit_test_setup_teardown(a_sidecar_may_have_comments, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(what_is_no_matrix_is_refused, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(a_list_names_files_and_scans, make_folder, remove_folder),
         cmocka_unit_test(products_apply_the_right_one_first),

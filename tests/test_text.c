@@ -62,6 +62,14 @@ static void separators_and_line_ends_vary(void **state)
                                         "1,2,3,\n4,5,6.5,\n",
                                         "\n\n1 2 3\n\n\n4 5 6.5\n\n",
                                         "# hello\n1 2 3\n# there\n4 5 6.5\n",
+                                        "; hello\n;\n1 2 3\n; there\n4 5 6.5\n",
+                                        "1 2 3 # first\n4 5 6.5 // second\n",
+                                        "1 2 3\r\r\n4 5 6.5\r\r\n\032",
+                                        "a title of it\n1 2 3\n4 5 6.5\n",
+                                        "made on 2024-05-06 by me\n\n1 2 3\n4 5 6.5\n",
+                                        "Punkte f\374r die H\366he\n1 2 3\n4 5 6.5\n",
+                                        "P1,1,2,3\nP2,4,5,6.5\n",
+                                        "1;2;3;tree\n4;5;6.5;house\n",
                                         "// hello\n1 2 3\n% there\n4 5 6.5\n",
                                         "1e0 +2.0 .3e1\n40e-1 5. 0.65E+1\n",
                                         "\"1\",\"2\",\"3\"\n\"4\",\"5\",\" 6.5 \"\n",
@@ -85,7 +93,9 @@ static void names_give_columns_their_meaning(void **state)
                                         "id east north height\n7 1 2 3\n8 4 5 6.5\n",
                                         "LAT LON ELEV\n2 1 3\n5 4 6.5\n",
                                         "x,east,y,z\n1,9,2,3\n4,9,5,6.5\n",
-                                        "x y z\n2\n1 2 3\n4 5 6.5\n"};
+                                        "x y z\n2\n1 2 3\n4 5 6.5\n",
+                                        "some title\nx y z\nm m m\n1 2 3\n4 5 6.5\n",
+                                        "z y x\n[m] [m] [m]\n3 2 1\n6.5 5 4\n"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
         check_two(texts[i]);
 
@@ -146,6 +156,57 @@ static void columns_without_names_are_guessed(void **state)
     read_text("1 2 3 4 5\n4 5 6 7 8.5\n", &p);
     assert_true(scan_points_value(&p, "column_5", 1, 0) == 8.5);
     scan_points_fini(&p);
+    read_text("1 2 3 65535 300 0\n4 5 6 1 2 257\n", &p);
+    assert_true(p.info.has_rgb && scan_points_value(&p, "rgb", 0, 0) == 65535);
+    assert_int_equal(p.rgbi[4 + 2], 1);
+    scan_points_fini(&p);
+    read_text("1 2 3 65535 300 0\n4 5 6 1 2 255\n", &p);
+    assert_false(p.info.has_rgb);
+    scan_points_fini(&p);
+    read_text("a 1 2 3 0.5 0.25 0.125\nb 4 5 6 1.0 0.75 0\n", &p);
+    assert_true(p.info.has_rgb && scan_points_value(&p, "rgb_float", 1, 1) == 0.75);
+    assert_int_equal(p.rgbi[0], 128);
+    scan_points_fini(&p);
+    read_text("1 2 3 0.6 0 0.8\n4 5 6 0.6 0 0.8\n", &p); /* a plane that faces one way */
+    assert_true(scan_points_value(&p, "normal", 1, 2) == (double)0.8f);
+    scan_points_fini(&p);
+}
+
+/* What Cyclone writes where only some of the scans were photographed. */
+static void blocks_may_differ_in_their_columns(void **state)
+{
+    (void)state;
+    scan_points p;
+    read_text("2\n1 2 3 -100\n4 5 6 100\n3\n7 8 9 50 10 20 30\n1 1 1 60 40 50 60\n"
+              "2 2 2 70 70 80 90\n",
+              &p);
+    assert_int_equal(p.count, 5);
+    assert_false(p.is_damaged);
+    assert_true(p.info.has_rgb && p.info.has_intensity);
+    assert_true(scan_points_value(&p, "intensity", 1, 0) == 100);
+    assert_int_equal(p.rgbi[4], 255); /* as bright as its intensity */
+    assert_int_equal(p.rgbi[4 * 2], 10);
+    assert_int_equal(p.rgbi[4 * 4 + 2], 90);
+    scan_points_fini(&p);
+}
+
+static void a_short_file_is_looked_at_up_to_its_end(void **state)
+{
+    (void)state;
+    enum { LINES = 5000 };
+    char *text = malloc(LINES * 32);
+    size_t size = 0;
+    for (int i = 0; i < LINES; i++)
+        size += (size_t)sprintf(text + size, "%d %d 1 %d 0 0\n", i, i % 7, i > 4000 ? 200 : 0);
+    scan_points p;
+    mospt_err err;
+    assert_true(scan_points_read(scan_points_file("a.txt", text, size), NULL, 999, &p, &err));
+    assert_int_equal(p.count, LINES);
+    assert_false(p.is_damaged);
+    assert_true(p.info.has_rgb);
+    assert_int_equal(p.rgbi[4 * 4500], 200);
+    scan_points_fini(&p);
+    free(text);
 }
 
 static void wide_and_floating_colours_are_scaled(void **state)
@@ -258,9 +319,10 @@ static void bad_lines_are_counted_and_named(void **state)
     assert_int_equal(p.damage.place_kind, MOSPT_AT_LINE);
     assert_int_equal(p.damage.place, 50);
     scan_points_fini(&p);
-    read_text("A title of this scan\n1 2 3\n4 5 6\n", &p);
+    read_text("1 2\n1 2 3\n4 5 6\n", &p); /* numbers are no title */
     assert_int_equal(p.count, 2);
     assert_int_equal(p.damage.place, 1);
+    assert_int_equal(p.dropped[PREP_DROP_UNREADABLE], 1);
     scan_points_fini(&p);
 }
 
@@ -305,7 +367,22 @@ static void what_is_no_point_file_is_refused(void **state)
     }
     assert_non_null(
         strstr(refuse("1 2\n3 4\n", NULL).message, "2 columns, a point needs x, y and z"));
-    assert_non_null(strstr(refuse("1,5;2,5;3,5\n", NULL).message, "decimal commas"));
+    static const char *const commas[] = {"1,5;2,5;3,5\n",
+                                         "x;y;z\n1,5;-2,5;3,5\n",
+                                         "1,5E+00\t2,5E+00\t3,5E-1\n",
+                                         "12;34;5,25\n13;35;6,5\n14;36;7\n",
+                                         "1,5;2,5;3,5;12.03.2024\n",
+                                         "\"1,5\",\"2,5\",\"3,5\"\n",
+                                         "\"1,5\";\"2,5\";\"3,5\"\n",
+                                         "1,5 2,5 3,5 255 0 0\n"};
+    for (size_t i = 0; i < sizeof commas / sizeof commas[0]; i++) {
+        mospt_err err = refuse(commas[i], NULL);
+        if (strstr(err.message, "decimal commas") == NULL)
+            fail_msg("`%s`: %s", commas[i], err.message);
+    }
+    assert_non_null(strstr(refuse("1 2 3\r4 5 6\r7 8 9\r", NULL).message, "CR alone"));
+    assert_non_null(strstr(refuse("1 2 3\n4 5\n7 8\n9 9\n1 2 3\n1 2 3\n1 2 3\n", NULL).message,
+                           "3 of 7 lines"));
     assert_int_equal(refuse("x y z\n", NULL).code, MOSPT_EEMPTY);
     assert_int_equal(refuse("0\n", NULL).code, MOSPT_EEMPTY);
     scan_points p;
@@ -328,6 +405,34 @@ static void the_content_decides_not_the_name(void **state)
     prep_scan_close(scan);
     assert_false(prep_scan_open(scan_points_file("a.txt", "ASTM-E57", 8), 0, NULL, &scan, &err));
     assert_non_null(strstr(err.message, "the file's header"));
+
+    static const char points[] = "4\n1 2 3 -7\n4 5 6 8\n1 1 1 1\n2 2 2 2\n";
+    static const char *const names[] = {"a.las", "a.laz", "a.ply", "a.pcd", "a.e57", "a.ptx", "a"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        scan_points p;
+        read_as(names[i], points, NULL, &p);
+        assert_int_equal(p.count, 4);
+        assert_string_equal(p.info.format, "text, 4 columns");
+        scan_points_fini(&p);
+    }
+    static const char pcd[] = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n";
+    assert_true(prep_scan_open(scan_points_file("a", pcd, strlen(pcd)), 0, NULL, &scan, &err));
+    assert_non_null(strstr(prep_scan_describe(scan)->format, "PCD"));
+    prep_scan_close(scan);
+}
+
+static void wide_characters_are_named(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {"\377\3761\0 \0002\0 \0003\0\n\0",
+                                        "\376\377\0001\0 \0002\0 \0003\0\n",
+                                        "1\0 \0002\0 \0003\0\n\0001\0"};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        prep_scan *scan;
+        mospt_err err;
+        assert_false(prep_scan_open(scan_points_file("a.txt", texts[i], 14), 0, NULL, &scan, &err));
+        assert_non_null(strstr(err.message, "UTF-16"));
+    }
 }
 
 static void long_lines_take_no_memory(void **state)
@@ -486,6 +591,8 @@ int main(void)
         cmocka_unit_test(separators_and_line_ends_vary),
         cmocka_unit_test(names_give_columns_their_meaning),
         cmocka_unit_test(columns_without_names_are_guessed),
+        cmocka_unit_test(blocks_may_differ_in_their_columns),
+        cmocka_unit_test(a_short_file_is_looked_at_up_to_its_end),
         cmocka_unit_test(wide_and_floating_colours_are_scaled),
         cmocka_unit_test(the_option_overrides_everything),
         cmocka_unit_test(letters_of_the_extension_count),
@@ -496,6 +603,7 @@ int main(void)
         cmocka_unit_test(announced_points_are_counted),
         cmocka_unit_test(what_is_no_point_file_is_refused),
         cmocka_unit_test(the_content_decides_not_the_name),
+        cmocka_unit_test(wide_characters_are_named),
         cmocka_unit_test(long_lines_take_no_memory),
         cmocka_unit_test(late_surprises_do_not_stop_reading),
         cmocka_unit_test(every_truncation_is_an_error_or_fewer_points),
