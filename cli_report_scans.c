@@ -64,6 +64,8 @@ void cli_report_scans(FILE *out, const char *path, const prep_inspection *scans,
     fprintf(out, "%s\n  format     %s, %s", path, scans[0].info.format, size);
     if (count > 1) fprintf(out, ", %u scans", count);
     fprintf(out, "\n");
+    if (scans[0].info.image_count > 0)
+        fprintf(out, "  images     %u, which are not read\n", scans[0].info.image_count);
     for (uint32_t i = 0; i < count; i++)
         print_scan(out, &scans[i], count);
 }
@@ -119,10 +121,11 @@ void cli_report_scans_json(FILE *out, const char *path, const prep_inspection *s
         points += scans[i].points;
         json_array_append_new(list, scan_json(&scans[i]));
     }
-    cli_write_json(out, json_pack("{s:o, s:o, s:I, s:I, s:o}", "file", cli_text_json(path),
+    cli_write_json(out, json_pack("{s:o, s:o, s:I, s:I, s:I, s:o}", "file", cli_text_json(path),
                                   "format", cli_text_json(scans[0].info.format), "bytes",
-                                  (json_int_t)scans[0].file_bytes, "points", (json_int_t)points,
-                                  "scans", list));
+                                  (json_int_t)scans[0].file_bytes, "images",
+                                  (json_int_t)scans[0].info.image_count, "points",
+                                  (json_int_t)points, "scans", list));
 }
 
 static const char *status_name(cli_each_status status)

@@ -246,6 +246,7 @@ static bool pick(prep_scan *scan, const file_index *index, uint32_t wanted, prep
             "the E57 file holds %" PRIu32 " scan%s and %" PRIu32 " image%s, but no points",
             index->seen, index->seen == 1 ? "" : "s", index->images, index->images == 1 ? "" : "s");
     out->scan_count = index->usable;
+    scan->info.image_count = index->images;
     if (wanted >= index->usable) return true;
     if (wanted == 0) note(scan, &index->fault);
     out->desc = calloc(1, sizeof *out->desc);

@@ -31,7 +31,8 @@ typedef struct {
     char name[256];  /* of the scan inside its file, or the file's base name */
     char format[64]; /* for people: "LAS 1.2, point format 3", "PLY binary little endian", "text, 7
                         columns" */
-    uint32_t scan_count; /* scans in the file */
+    uint32_t scan_count;  /* scans in the file */
+    uint32_t image_count; /* pictures in the file, which are not read */
     uint64_t
         point_count; /* as declared and as far as the file's size agrees; 0 if only reading tells */
     bool has_bounds; /* the header declares bounds; they may lie */

@@ -690,6 +690,25 @@ static void real_files_hold_what_their_manifest_says(void **state)
     assert_int_equal(failures, 0);
 }
 
+static void pictures_are_counted(void **state)
+{
+    (void)state;
+    e57_made m;
+    e57_begin(&m);
+    e57_loaded l;
+    e57_load_file(&(write_e57_file){.scans = &m.scan,
+                                    .scan_count = 1,
+                                    .xml = "<images2D type=\"Vector\"><vectorChild type="
+                                           "\"Structure\"/><vectorChild type=\"Structure\">"
+                                           "<name type=\"String\">b</name></vectorChild>"
+                                           "</images2D>"},
+                  0, &l);
+    e57_check_xyz(&l);
+    assert_int_equal(l.damage.code, MOSPT_OK);
+    assert_int_equal(l.info.image_count, 2);
+    e57_unload(&l);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -711,6 +730,7 @@ int main(void)
         cmocka_unit_test(scans_are_counted_without_the_empty_and_the_broken),
         cmocka_unit_test(a_memory_spares_the_xml_for_the_next_scan),
         cmocka_unit_test(coordinates_are_needed),
+        cmocka_unit_test(pictures_are_counted),
         cmocka_unit_test(real_files_hold_what_their_manifest_says),
     };
     e57_tools_init();
