@@ -105,6 +105,8 @@ void cli_report_build(FILE *out, const char *output, const prep_build_result *r)
     fprintf(out, "  points     %s read, %s kept", cli_grouped(m->point_count + dropped, a),
             cli_grouped(m->point_count, b));
     if (dropped > 0) print_reasons(out, m);
+    if (r->kept_points > 0)
+        fprintf(out, "; %s were there from an interrupted build", cli_grouped(r->kept_points, a));
     fprintf(out, "\n  scans      %" PRIu32 "%s\n", m->source_count,
             prep_build_left_something_out(r) ? ", and some input left out (see above)" : "");
     print_other_crs(out, m);
@@ -177,15 +179,16 @@ void cli_report_build_json(FILE *out, const char *output, const prep_build_resul
         json_object_set_new(seconds, prep_phase_name((prep_phase)p), json_real(r->seconds[p]));
     json_object_set_new(seconds, "total", json_real(r->total_seconds));
     cli_write_json(
-        out, json_pack(
-                 "{s:o, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
-                 "output", cli_text_json(output), "points", (json_int_t)m->point_count, "dropped",
-                 (json_int_t)points_dropped(m), "bounds", bounds_json(m), "crs",
-                 cli_text_json(m->crs), "sources", sources_json(m), "left_out", left_out, "unknown",
-                 unknown, "nodes", (json_int_t)r->node_count, "levels", (json_int_t)r->level_count,
-                 "bytes", (json_int_t)r->payload_bytes, "position_error", m->position_error, "step",
-                 m->grid.step, "peak_memory", (json_int_t)r->peak_memory, "scratch_bytes",
-                 (json_int_t)r->scratch_bytes, "seconds", seconds));
+        out,
+        json_pack(
+            "{s:o, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
+            "output", cli_text_json(output), "points", (json_int_t)m->point_count, "kept_points",
+            (json_int_t)r->kept_points, "dropped", (json_int_t)points_dropped(m), "bounds",
+            bounds_json(m), "crs", cli_text_json(m->crs), "sources", sources_json(m), "left_out",
+            left_out, "unknown", unknown, "nodes", (json_int_t)r->node_count, "levels",
+            (json_int_t)r->level_count, "bytes", (json_int_t)r->payload_bytes, "position_error",
+            m->position_error, "step", m->grid.step, "peak_memory", (json_int_t)r->peak_memory,
+            "scratch_bytes", (json_int_t)r->scratch_bytes, "seconds", seconds));
 }
 
 static void print_sources(FILE *out, const mospt_metadata *m)
@@ -225,7 +228,13 @@ void cli_report_info(FILE *out, const mospt_dataset *d, const mospt_tree_figures
 {
     const mospt_metadata *m = &d->metadata;
     char a[32], b[32];
-    fprintf(out, "%s\n  points     %s\n  min        ", d->path, cli_grouped(m->point_count, a));
+    fprintf(out, "%s\n  points     %s", d->path, cli_grouped(m->point_count, a));
+    if (m->unfinished.commit > 0)
+        fprintf(out,
+                " of %s: the dataset is being built, or its build was interrupted; the same "
+                "build command goes on from here",
+                cli_grouped(m->unfinished.points, b));
+    fprintf(out, "\n  min        ");
     cli_print_triple(out, m->low);
     fprintf(out, "\n  max        ");
     cli_print_triple(out, m->high);
@@ -315,6 +324,8 @@ void cli_report_info_json(FILE *out, const mospt_dataset *d, const mospt_tree_fi
                   cli_text_json(m->crs), "grid", "step", m->grid.step, "cube",
                   m->grid.step * (double)(UINT64_C(1) << m->grid.bits), "bits", (int)m->grid.bits,
                   "position_error", m->position_error, "inner_depth", (int)m->inner_depth);
+    if (m->unfinished.commit > 0)
+        json_object_set_new(json, "unfinished_of", json_integer((json_int_t)m->unfinished.points));
     json_object_set_new(json, "tree",
                         json_pack("{s:I, s:I, s:I, s:f, s:f}", "nodes", (json_int_t)t->nodes,
                                   "leaves", (json_int_t)t->leaves, "levels", (json_int_t)t->levels,

@@ -18,6 +18,15 @@ bool mospt_dataset_exists(const char *path)
     return exists;
 }
 
+bool mospt_dataset_is_unfinished(const char *path)
+{
+    mospt_metadata m;
+    if (!mospt_metadata_read(path, &m, NULL)) return false;
+    bool is_unfinished = m.unfinished.commit > 0;
+    mospt_metadata_fini(&m);
+    return is_unfinished;
+}
+
 void mospt_dataset_close(mospt_dataset *dataset)
 {
     if (dataset == NULL) return;
@@ -70,37 +79,63 @@ static bool payloads_fit(const mospt_dataset *d, mospt_err *err)
     return true;
 }
 
+static bool hierarchy_fits(const mospt_dataset *d, const char *path, mospt_err *err)
+{
+    const mospt_hierarchy *h = &d->hierarchy;
+    const mospt_metadata *m = &d->metadata;
+    if (h->inner_depth != m->inner_depth || h->point_count != m->point_count)
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path),
+                             "holds %" PRIu64 " points at inner depth %" PRIu32
+                             ", metadata.json says %" PRIu64 " at %" PRIu32,
+                             h->point_count, h->inner_depth, m->point_count, m->inner_depth);
+    if (m->unfinished.commit == 0 && !mospt_hierarchy_is_finished(h))
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path),
+                             "has nodes that wait for children, metadata.json says that the "
+                             "dataset is finished");
+    return true;
+}
+
+/* Opens what the metadata names. */
+static bool open_named(mospt_dataset *d, mospt_err *err)
+{
+    char *path = mospt_file_join(d->path, d->metadata.hierarchy_name);
+    if (path == NULL) return mospt_err_nomem(err, strlen(d->path));
+    bool ok = mospt_hierarchy_read(path, &d->metadata.grid, d->metadata.hierarchy_size,
+                                   d->metadata.hierarchy_hash, &d->hierarchy, err) &&
+              hierarchy_fits(d, path, err) && open_payloads(d, err) && payloads_fit(d, err);
+    free(path);
+    return ok;
+}
+
+/* True if the dataset has been committed again since its metadata was read. */
+static bool has_gone_on(const mospt_dataset *d)
+{
+    mospt_metadata now;
+    if (!mospt_metadata_read(d->path, &now, NULL)) return false;
+    bool has = now.generation != d->metadata.generation ||
+               now.unfinished.commit != d->metadata.unfinished.commit;
+    mospt_metadata_fini(&now);
+    return has;
+}
+
 bool mospt_dataset_open(const char *path, mospt_dataset **out, mospt_err *err)
 {
-    bool ok = false;
-    char *hierarchy_path = NULL;
-    mospt_dataset *d = calloc(1, sizeof *d);
-    if (d == NULL) return mospt_err_nomem(err, sizeof *d);
-    if (!mospt_metadata_read(path, &d->metadata, err)) goto done;
-    d->path = strdup(path);
-    hierarchy_path = mospt_file_join(path, d->metadata.hierarchy_name);
-    if (d->path == NULL || hierarchy_path == NULL) {
-        mospt_err_nomem(err, strlen(path));
-        goto done;
+    for (;;) {
+        mospt_dataset *d = calloc(1, sizeof *d);
+        if (d == NULL || (d->path = strdup(path)) == NULL) {
+            free(d);
+            return mospt_err_nomem(err, strlen(path));
+        }
+        bool is_read = mospt_metadata_read(path, &d->metadata, err);
+        if (is_read && open_named(d, err)) {
+            *out = d;
+            return true;
+        }
+        /* A build that is running removes what its next commit no longer names. */
+        bool again = is_read && has_gone_on(d);
+        mospt_dataset_close(d);
+        if (!again) return false;
     }
-    if (!mospt_hierarchy_read(hierarchy_path, &d->metadata.grid, d->metadata.hierarchy_size,
-                              d->metadata.hierarchy_hash, &d->hierarchy, err))
-        goto done;
-    if (d->hierarchy.inner_depth != d->metadata.inner_depth ||
-        d->hierarchy.point_count != d->metadata.point_count) {
-        mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(hierarchy_path),
-                      "holds %" PRIu64 " points at inner depth %" PRIu32
-                      ", metadata.json says %" PRIu64 " at %" PRIu32,
-                      d->hierarchy.point_count, d->hierarchy.inner_depth, d->metadata.point_count,
-                      d->metadata.inner_depth);
-        goto done;
-    }
-    ok = open_payloads(d, err) && payloads_fit(d, err);
-done:
-    free(hierarchy_path);
-    if (ok) *out = d;
-    else mospt_dataset_close(d);
-    return ok;
 }
 
 static bool read_part(const mospt_dataset *d, uint32_t node, uint64_t skip, void *out, size_t size,

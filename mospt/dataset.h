@@ -30,8 +30,16 @@ typedef struct {
     uint64_t size; /* bytes that belong to this generation */
 } mospt_payload_file;
 
+/* What is said of a dataset whose build is still running, or was interrupted. */
 typedef struct {
-    uint64_t generation;
+    uint64_t commit; /* counts, from 1; 0: the dataset is finished, and the rest means nothing */
+    uint64_t points, points_hash; /* of all points, once it is finished */
+    uint64_t build; /* hash of what it is built from, and how: what a build must have to go on */
+} mospt_unfinished;
+
+typedef struct {
+    uint64_t generation; /* counts finished states, from 1; that which an unfinished one becomes */
+    mospt_unfinished unfinished;
     mospt_grid grid;
     mospt_schema schema;
     uint32_t inner_depth; /* of every MOSPT */
@@ -69,7 +77,11 @@ typedef struct {
 /* True if there is a folder with a metadata.json at `path`. */
 bool mospt_dataset_exists(const char *path);
 
-/* Opens a dataset; nothing but the outer octree is read. Closed by mospt_dataset_close().
+/* True if there is a dataset that a build has left unfinished, or is still writing. */
+bool mospt_dataset_is_unfinished(const char *path);
+
+/* Opens a dataset; nothing but the outer octree is read. Closed by mospt_dataset_close(). What is
+ * being built is seen as of the last commit, and goes on being readable after the next ones.
  * errors   MOSPT_EIO (a file is missing), MOSPT_EFORMAT, MOSPT_ENOMEM */
 bool mospt_dataset_open(const char *path, mospt_dataset **out, mospt_err *err);
 void mospt_dataset_close(mospt_dataset *dataset);

@@ -5,5 +5,9 @@
 
 uint64_t mospt_hash(const void *bytes, size_t size);
 
+/* Goes on from the hash of what came before (0: nothing) to that of several pieces in their order.
+ */
+uint64_t mospt_hash_more(uint64_t before, const void *bytes, size_t size);
+
 /* Sum modulo 2^64 of the hash of each record: does not depend on their order. */
 uint64_t mospt_hash_records(const uint8_t *records, size_t stride, size_t count);

@@ -25,8 +25,8 @@ typedef struct {
 typedef struct {
     uint32_t corner[3];
     uint16_t level, payload_file;
-    uint8_t child_mask, child_count, codec, reserved_1;
-    uint32_t first_child, count, reserved_2;
+    uint8_t child_mask, child_count, codec, pending_mask;
+    uint32_t first_child, count, reserved_1;
     uint64_t payload_offset, payload_size, vertices_hash, attributes_hash;
 } file_record;
 
@@ -90,6 +90,7 @@ static bool node_from_record(const uint8_t *bytes, uint32_t levels, mospt_node *
         .level = r.level,
         .child_mask = r.child_mask,
         .child_count = r.child_count,
+        .pending_mask = r.pending_mask,
         .first_child = r.first_child,
         .parent = MOSPT_NO_NODE,
         .count = r.count,
@@ -101,7 +102,7 @@ static bool node_from_record(const uint8_t *bytes, uint32_t levels, mospt_node *
         .codec = r.codec,
     };
     memcpy(node->level_end, bytes + RECORD_FIXED_SIZE, levels * sizeof(uint32_t));
-    return r.reserved_1 == 0 && r.reserved_2 == 0;
+    return r.reserved_1 == 0;
 }
 
 static void node_to_record(const mospt_node *node, uint32_t levels, uint8_t *bytes)
@@ -112,6 +113,7 @@ static void node_to_record(const mospt_node *node, uint32_t levels, uint8_t *byt
         .payload_file = node->payload_file,
         .child_mask = node->child_mask,
         .child_count = node->child_count,
+        .pending_mask = node->pending_mask,
         .codec = node->codec,
         .first_child = node->first_child,
         .count = node->count,
@@ -263,6 +265,8 @@ bool mospt_hierarchy_is_valid(const mospt_hierarchy *h, const mospt_grid *grid, 
         const mospt_node *n = &h->nodes[i];
         if (n->child_count != __builtin_popcount(n->child_mask))
             return node_fails(err, i, "its children and their octants differ in number");
+        if ((n->child_mask & n->pending_mask) != 0)
+            return node_fails(err, i, "waits for a child that it has");
         if (n->child_count == 0 ? n->first_child != MOSPT_NO_NODE
                                 : n->first_child != next || h->count - next < n->child_count)
             return node_fails(err, i, "its children do not follow those of the node before");
@@ -298,21 +302,49 @@ static int compare_nodes(const void *a, const void *b)
     return m->corner[axis] < n->corner[axis] ? -1 : 1;
 }
 
+/* Links a node to its children, of which the first that is there is node `next`. Returns where
+ * those of the following node begin. */
+static uint32_t link_children(mospt_hierarchy *h, const mospt_grid *grid, uint32_t i, uint32_t next)
+{
+    mospt_node *n = &h->nodes[i];
+    uint8_t mask = n->child_mask | n->pending_mask;
+    uint32_t first = next;
+    n->child_mask = 0;
+    for (uint32_t octant = 0; octant < MOSPT_CHILDREN_MAX && next < h->count; octant++) {
+        mospt_node *child = &h->nodes[next];
+        uint32_t corner[3];
+        if (!(mask >> octant & 1)) continue;
+        mospt_cell_child(grid, n->corner, n->level, octant, corner);
+        if (child->level != n->level + 1 || memcmp(child->corner, corner, sizeof corner) != 0)
+            continue;
+        n->child_mask |= (uint8_t)(1u << octant);
+        child->parent = i;
+        next++;
+    }
+    n->pending_mask = mask & (uint8_t)~n->child_mask;
+    n->child_count = (uint8_t)(next - first);
+    n->first_child = next > first ? first : MOSPT_NO_NODE;
+    return next;
+}
+
 bool mospt_hierarchy_link(mospt_hierarchy *h, const mospt_grid *grid, mospt_err *err)
 {
     qsort(h->nodes, h->count, sizeof *h->nodes, compare_nodes);
     uint32_t next = 1;
     h->point_count = 0;
     for (uint32_t i = 0; i < h->count; i++) {
-        mospt_node *n = &h->nodes[i];
-        n->child_count = (uint8_t)__builtin_popcount(n->child_mask);
-        n->first_child = n->child_count > 0 ? next : MOSPT_NO_NODE;
-        if (i == 0) n->parent = MOSPT_NO_NODE;
-        for (uint32_t c = 0; c < n->child_count && next < h->count; c++)
-            h->nodes[next++].parent = i;
-        h->point_count += n->count;
+        if (i == 0) h->nodes[i].parent = MOSPT_NO_NODE;
+        next = link_children(h, grid, i, next);
+        h->point_count += h->nodes[i].count;
     }
     return mospt_hierarchy_is_valid(h, grid, err);
+}
+
+bool mospt_hierarchy_is_finished(const mospt_hierarchy *hierarchy)
+{
+    for (uint32_t i = 0; i < hierarchy->count; i++)
+        if (hierarchy->nodes[i].pending_mask != 0) return false;
+    return true;
 }
 
 uint32_t mospt_hierarchy_child(const mospt_hierarchy *hierarchy, uint32_t node, uint32_t octant)

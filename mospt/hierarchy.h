@@ -22,6 +22,8 @@ typedef struct {
     uint16_t level;     /* of the outer octree; 0 is the root */
     uint8_t child_mask; /* bit o: child in octant o. Octants with a child reject, those without add
                            (section 4.6) */
+    uint8_t pending_mask; /* octants that reject, too, but whose child an unfinished build has not
+                             come to */
     uint8_t child_count;
     uint32_t first_child; /* index; children follow each other in octant order; MOSPT_NO_NODE
                              without any */
@@ -61,8 +63,11 @@ bool mospt_hierarchy_is_valid(const mospt_hierarchy *hierarchy, const mospt_grid
                               mospt_err *err);
 
 /* Sorts nodes that were made in any order (parents unset) by level and Morton order, and links
- * them. */
+ * them. Octants of `child_mask` without a node are pending. */
 bool mospt_hierarchy_link(mospt_hierarchy *hierarchy, const mospt_grid *grid, mospt_err *err);
+
+/* True if no node waits for a child. */
+bool mospt_hierarchy_is_finished(const mospt_hierarchy *hierarchy);
 
 /* Child of a node in `octant`; MOSPT_NO_NODE if there is none. */
 uint32_t mospt_hierarchy_child(const mospt_hierarchy *hierarchy, uint32_t node, uint32_t octant);

@@ -94,6 +94,13 @@ static json_t *source_to_json(const mospt_source *s)
     return json;
 }
 
+static json_t *unfinished_to_json(const mospt_unfinished *u)
+{
+    return json_pack("{s:I, s:I, s:o, s:o}", "commit", (json_int_t)u->commit, "points",
+                     (json_int_t)u->points, "points_hash", hash_to_json(u->points_hash), "build",
+                     hash_to_json(u->build));
+}
+
 static json_t *metadata_to_json(const mospt_metadata *m)
 {
     json_t *payloads = json_array(), *sources = json_array();
@@ -102,18 +109,19 @@ static json_t *metadata_to_json(const mospt_metadata *m)
                                                   (json_int_t)m->files[i].size));
     for (uint32_t i = 0; i < m->source_count; i++)
         json_array_append_new(sources, source_to_json(&m->sources[i]));
-    return json_pack("{s:s, s:i, s:I, s:I, s:o, s:f, s:{s:o, s:o}, s:o, s:s, s:i, s:i, s:o, s:o, "
-                     "s:{s:s, s:I, s:o}, s:o, s:o}",
+    json_t *unfinished = m->unfinished.commit > 0 ? unfinished_to_json(&m->unfinished) : NULL;
+    return json_pack("{s:s, s:i, s:I, s:o*, s:I, s:o, s:f, s:{s:o, s:o}, s:o, s:s, s:i, s:i, s:o, "
+                     "s:o, s:{s:s, s:I, s:o}, s:o, s:o}",
                      "format", "instantpoints dataset", "version", VERSION, "generation",
-                     (json_int_t)m->generation, "points", (json_int_t)m->point_count, "points_hash",
-                     hash_to_json(m->points_hash), "position_error", m->position_error, "bounds",
-                     "min", reals_to_json(m->low, 3), "max", reals_to_json(m->high, 3), "grid",
-                     grid_to_json(&m->grid), "refinement", "additive", "inner_depth",
-                     (int)m->inner_depth, "add_threshold", (int)m->add_threshold, "crs",
-                     text_to_json(m->crs != NULL ? m->crs : ""), "attributes",
-                     attributes_to_json(&m->schema), "hierarchy", "file", m->hierarchy_name, "size",
-                     (json_int_t)m->hierarchy_size, "hash", hash_to_json(m->hierarchy_hash),
-                     "payloads", payloads, "sources", sources);
+                     (json_int_t)m->generation, "unfinished", unfinished, "points",
+                     (json_int_t)m->point_count, "points_hash", hash_to_json(m->points_hash),
+                     "position_error", m->position_error, "bounds", "min", reals_to_json(m->low, 3),
+                     "max", reals_to_json(m->high, 3), "grid", grid_to_json(&m->grid), "refinement",
+                     "additive", "inner_depth", (int)m->inner_depth, "add_threshold",
+                     (int)m->add_threshold, "crs", text_to_json(m->crs != NULL ? m->crs : ""),
+                     "attributes", attributes_to_json(&m->schema), "hierarchy", "file",
+                     m->hierarchy_name, "size", (json_int_t)m->hierarchy_size, "hash",
+                     hash_to_json(m->hierarchy_hash), "payloads", payloads, "sources", sources);
 }
 
 bool mospt_metadata_write(const mospt_metadata *metadata, const char *dataset_path, mospt_err *err)
@@ -299,6 +307,14 @@ static void lists_from_json(parse *p, json_t *json, mospt_metadata *m)
         source_from_json(p, json_array_get(sources, i), &m->sources[m->source_count++]);
 }
 
+static void unfinished_from_json(parse *p, json_t *json, mospt_unfinished *u)
+{
+    u->commit = (uint64_t)get_integer(p, json, "commit", 1, INT64_MAX);
+    u->points = (uint64_t)get_integer(p, json, "points", 1, INT64_MAX);
+    u->points_hash = get_hash(p, json, "points_hash");
+    u->build = get_hash(p, json, "build");
+}
+
 static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
 {
     const char *format = json_string_value(json_object_get(json, "format"));
@@ -318,6 +334,8 @@ static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
     const char *refinement = json_string_value(get(p, json, "refinement"));
     if (refinement == NULL || strcmp(refinement, "additive") != 0) wrong(p, "refinement");
     m->generation = (uint64_t)get_integer(p, json, "generation", 1, INT64_MAX);
+    json_t *unfinished = json_object_get(json, "unfinished");
+    if (unfinished != NULL) unfinished_from_json(p, unfinished, &m->unfinished);
     m->point_count = (uint64_t)get_integer(p, json, "points", 1, INT64_MAX);
     m->points_hash = get_hash(p, json, "points_hash");
     m->position_error = json_number_value(get(p, json, "position_error"));

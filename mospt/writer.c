@@ -2,9 +2,12 @@
 
 #include "mospt/file.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -12,26 +15,57 @@
 
 /* Levels from here on share the last file: only piles of identical positions get so deep. */
 enum { FILES_MAX = 64 };
+#define PAYLOAD_NAME "points-%02u.bin"
+#define UNFINISHED_NAME "unfinished-%06" PRIu64 ".bin"
+
+/* A node that has its place. */
+typedef struct {
+    mospt_node node; /* its child_mask names all children, whether they are there or not */
+    uint64_t points_hash;
+    bool is_complete;
+} placed;
 
 struct mospt_writer {
     char *path; /* owned */
-    bool committed;
-    mospt_hierarchy hierarchy;
-    uint32_t capacity; /* of hierarchy.nodes */
+    uint32_t inner_depth;
+    bool found; /* an unfinished dataset was in the folder, and has not been touched yet */
+    bool keeps; /* and is to be gone on from */
+    bool finished;
+    uint64_t commit, committed_points; /* of the last unfinished state; 0: none */
+
+    pthread_mutex_t lock;
+    /* Under the lock: */
+    placed *nodes; /* [capacity], owned */
+    uint32_t count, capacity;
+    uint32_t leading; /* so many nodes are complete before the first that is not */
+    mospt_written of_leading, of_all;
+    uint64_t bytes;
     uint32_t file_count;
     int fd[FILES_MAX];
     uint64_t size[FILES_MAX];
-    uint64_t bytes;
 };
+
+static bool is_unfinished(const char *name)
+{
+    unsigned number;
+    char same[64];
+    if (sscanf(name, "unfinished-%u", &number) != 1) return false;
+    int length = snprintf(same, sizeof same, UNFINISHED_NAME, (uint64_t)number);
+    return strncmp(name, same, (size_t)length) == 0 &&
+           (name[length] == '\0' || strcmp(name + length, ".new") == 0);
+}
 
 /* Names that a build gives its files, and no others that only look like them. */
 static bool is_ours(const char *name)
 {
     unsigned number;
     char same[64];
-    if (strcmp(name, "metadata.json.new") == 0) return true;
+    if (strncmp(name, "metadata.json", 13) == 0 &&
+        (name[13] == '\0' || strcmp(name + 13, ".new") == 0))
+        return true;
+    if (is_unfinished(name)) return true;
     if (sscanf(name, "points-%u", &number) == 1) {
-        snprintf(same, sizeof same, "points-%02u.bin", number);
+        snprintf(same, sizeof same, PAYLOAD_NAME, number);
         return strcmp(name, same) == 0;
     }
     if (sscanf(name, "hierarchy-%u", &number) != 1) return false;
@@ -66,6 +100,13 @@ static bool refuse_others(int folder, const char *path, const char *name, mospt_
                          name);
 }
 
+static bool remove_unfinished(int folder, const char *path, const char *name, mospt_err *err)
+{
+    (void)path, (void)err;
+    if (is_unfinished(name)) unlinkat(folder, name, 0);
+    return true;
+}
+
 static bool remove_ours(int folder, const char *path, const char *name, mospt_err *err)
 {
     if (!is_ours(name) || unlinkat(folder, name, 0) == 0) return true;
@@ -74,65 +115,104 @@ static bool remove_ours(int folder, const char *path, const char *name, mospt_er
 
 bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **out, mospt_err *err)
 {
-    if (mospt_dataset_exists(path))
+    bool found = mospt_dataset_is_unfinished(path);
+    if (mospt_dataset_exists(path) && !found)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "is a dataset already");
     if (mkdir(path, 0777) != 0) {
         if (errno != EEXIST)
             return mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
         /* Nothing is removed before all has been looked at. */
-        if (!each_entry(path, refuse_others, err) || !each_entry(path, remove_ours, err))
-            return false;
+        if (!each_entry(path, refuse_others, err)) return false;
+        if (!found && !each_entry(path, remove_ours, err)) return false;
     }
     mospt_writer *w = calloc(1, sizeof *w);
     if (w == NULL) return mospt_err_nomem(err, sizeof *w);
-    w->hierarchy.inner_depth = inner_depth;
-    w->hierarchy.refinement = MOSPT_REFINE_ADD;
-    w->path = strdup(path);
+    *w = (mospt_writer){.path = strdup(path), .inner_depth = inner_depth, .found = found};
     if (w->path == NULL) {
         free(w);
         return mospt_err_nomem(err, strlen(path));
     }
+    pthread_mutex_init(&w->lock, NULL);
     *out = w;
     return true;
+}
+
+void mospt_writer_keep(mospt_writer *w, const mospt_metadata *kept)
+{
+    assert(w->found && w->count == 0);
+    w->keeps = true;
+    w->commit = kept->unfinished.commit;
+    w->committed_points = kept->point_count;
 }
 
 static bool add_file(mospt_writer *w, mospt_err *err)
 {
     char name[32];
-    snprintf(name, sizeof name, "points-%02u.bin", w->file_count);
+    snprintf(name, sizeof name, PAYLOAD_NAME, w->file_count);
     char *path = mospt_file_join(w->path, name);
     if (path == NULL) return mospt_err_nomem(err, strlen(w->path));
-    int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
     if (fd < 0) mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
     else w->fd[w->file_count++] = fd;
     free(path);
     return fd >= 0;
 }
 
-bool mospt_writer_place(mospt_writer *w, mospt_node *node, uint32_t *index, mospt_err *err)
+/* Before the first node has its place: what is not gone on from is removed, its root first. */
+static bool take_folder(mospt_writer *w, mospt_err *err)
+{
+    bool removes = w->found && !w->keeps;
+    char *root = mospt_file_join(w->path, "metadata.json");
+    if (root == NULL) return mospt_err_nomem(err, strlen(w->path));
+    w->found = false;
+    if (removes) unlink(root);
+    free(root);
+    return !removes || each_entry(w->path, remove_ours, err);
+}
+
+/* Under the lock. */
+static bool place(mospt_writer *w, mospt_node *node, uint32_t *index, mospt_err *err)
 {
     uint32_t file = node->level < FILES_MAX ? node->level : FILES_MAX - 1;
+    if (w->count == 0 && !take_folder(w, err)) return false;
     while (w->file_count <= file)
         if (!add_file(w, err)) return false;
-    if (w->hierarchy.count == w->capacity) {
+    if (w->count == w->capacity) {
         uint32_t capacity = w->capacity > 0 ? 2 * w->capacity : 1024;
-        mospt_node *nodes = realloc(w->hierarchy.nodes, capacity * sizeof *nodes);
+        placed *nodes = realloc(w->nodes, capacity * sizeof *nodes);
         if (nodes == NULL) return mospt_err_nomem(err, capacity * sizeof *nodes);
-        w->hierarchy.nodes = nodes;
+        w->nodes = nodes;
         w->capacity = capacity;
     }
     node->payload_file = (uint16_t)file;
     node->payload_offset = w->size[file];
     w->size[file] += node->payload_size;
     w->bytes += node->payload_size;
-    *index = w->hierarchy.count++;
-    w->hierarchy.nodes[*index] = *node;
+    *index = w->count++;
+    w->nodes[*index] = (placed){.node = *node};
     return true;
 }
 
-void mospt_writer_complete(mospt_writer *w, uint32_t index, const mospt_node *node)
+bool mospt_writer_place(mospt_writer *w, mospt_node *node, uint32_t *index, mospt_err *err)
 {
-    w->hierarchy.nodes[index] = *node;
+    pthread_mutex_lock(&w->lock);
+    bool ok = place(w, node, index, err);
+    pthread_mutex_unlock(&w->lock);
+    return ok;
+}
+
+void mospt_writer_complete(mospt_writer *w, uint32_t index, const mospt_node *node,
+                           uint64_t points_hash)
+{
+    pthread_mutex_lock(&w->lock);
+    w->nodes[index] = (placed){.node = *node, .points_hash = points_hash, .is_complete = true};
+    w->of_all.points += node->count;
+    w->of_all.points_hash += points_hash;
+    for (; w->leading < w->count && w->nodes[w->leading].is_complete; w->leading++) {
+        w->of_leading.points += w->nodes[w->leading].node.count;
+        w->of_leading.points_hash += w->nodes[w->leading].points_hash;
+    }
+    pthread_mutex_unlock(&w->lock);
 }
 
 bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
@@ -153,36 +233,147 @@ uint64_t mospt_writer_bytes(const mospt_writer *writer)
 
 uint32_t mospt_writer_nodes(const mospt_writer *writer)
 {
-    return writer->hierarchy.count;
+    return writer->count;
 }
 
-bool mospt_writer_commit(mospt_writer *w, mospt_metadata *m, mospt_err *err)
+mospt_written mospt_writer_written(mospt_writer *w)
 {
-    m->files = calloc(w->file_count + 1, sizeof *m->files);
-    if (m->files == NULL) return mospt_err_nomem(err, w->file_count * sizeof *m->files);
-    for (; m->file_count < w->file_count; m->file_count++) {
-        char name[32];
-        snprintf(name, sizeof name, "points-%02u.bin", m->file_count);
-        m->files[m->file_count].size = w->size[m->file_count];
-        m->files[m->file_count].name = strdup(name);
-        if (m->files[m->file_count].name == NULL) return mospt_err_nomem(err, sizeof name);
-        if (fsync(w->fd[m->file_count]) != 0)
-            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
-                                 "%s cannot be flushed to the disk", name);
+    pthread_mutex_lock(&w->lock);
+    mospt_written written = w->of_all;
+    pthread_mutex_unlock(&w->lock);
+    return written;
+}
+
+/* What a commit is about: the leading nodes, and as much of each file as they take. */
+typedef struct {
+    mospt_hierarchy hierarchy; /* owned */
+    mospt_written written;
+    uint32_t file_count;
+    uint64_t size[FILES_MAX];
+} state;
+
+static bool take_state(mospt_writer *w, state *out, mospt_err *err)
+{
+    pthread_mutex_lock(&w->lock);
+    *out = (state){.hierarchy = {.nodes = malloc((w->leading + 1) * sizeof(mospt_node)),
+                                 .count = w->leading,
+                                 .inner_depth = w->inner_depth,
+                                 .refinement = MOSPT_REFINE_ADD},
+                   .written = w->of_leading};
+    for (uint32_t i = 0; out->hierarchy.nodes != NULL && i < w->leading; i++) {
+        const mospt_node *n = &w->nodes[i].node;
+        out->hierarchy.nodes[i] = *n;
+        out->size[n->payload_file] = n->payload_offset + n->payload_size;
+        if (out->file_count <= n->payload_file) out->file_count = n->payload_file + 1;
     }
-    if (!mospt_hierarchy_link(&w->hierarchy, &m->grid, err)) return false;
+    pthread_mutex_unlock(&w->lock);
+    return out->hierarchy.nodes != NULL || mospt_err_nomem(err, w->leading * sizeof(mospt_node));
+}
+
+static bool list_files(const state *s, mospt_metadata *m, mospt_err *err)
+{
+    m->files = calloc(s->file_count + 1, sizeof *m->files);
+    if (m->files == NULL) return mospt_err_nomem(err, s->file_count * sizeof *m->files);
+    for (m->file_count = 0; m->file_count < s->file_count; m->file_count++) {
+        mospt_payload_file *file = &m->files[m->file_count];
+        file->size = s->size[m->file_count];
+        if (asprintf(&file->name, PAYLOAD_NAME, m->file_count) < 0) {
+            file->name = NULL;
+            return mospt_err_nomem(err, sizeof PAYLOAD_NAME);
+        }
+    }
+    return true;
+}
+
+static bool flush_files(const mospt_writer *w, const state *s, mospt_err *err)
+{
+    for (uint32_t i = 0; i < s->file_count; i++)
+        if (fsync(w->fd[i]) != 0)
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
+                                 PAYLOAD_NAME " cannot be flushed to the disk", i);
+    return true;
+}
+
+/* metadata  out: files, which it owns, and hierarchy; its hierarchy_name is given */
+static bool commit(const mospt_writer *w, state *s, mospt_metadata *m, mospt_err *err)
+{
+    if (!list_files(s, m, err) || !flush_files(w, s, err) ||
+        !mospt_hierarchy_link(&s->hierarchy, &m->grid, err))
+        return false;
+    if (m->unfinished.commit == 0 && !mospt_hierarchy_is_finished(&s->hierarchy))
+        return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(w->path),
+                             "nodes wait for children that were never written");
     m->generation = 1;
-    m->inner_depth = w->hierarchy.inner_depth;
-    m->point_count = w->hierarchy.point_count;
-    snprintf(m->hierarchy_name, sizeof m->hierarchy_name, "hierarchy-%06u.bin", 1u);
+    m->inner_depth = w->inner_depth;
+    m->point_count = s->hierarchy.point_count;
     char *path = mospt_file_join(w->path, m->hierarchy_name);
     if (path == NULL) return mospt_err_nomem(err, strlen(w->path));
     bool ok =
-        mospt_hierarchy_write(&w->hierarchy, path, &m->hierarchy_size, &m->hierarchy_hash, err) &&
+        mospt_hierarchy_write(&s->hierarchy, path, &m->hierarchy_size, &m->hierarchy_hash, err) &&
         mospt_metadata_write(m, w->path, err);
     free(path);
-    w->committed = ok;
     return ok;
+}
+
+/* Removes the hierarchy of an unfinished state that is no longer named. */
+static void remove_state(const mospt_writer *w, uint64_t number)
+{
+    char name[64];
+    snprintf(name, sizeof name, UNFINISHED_NAME, number);
+    char *path = mospt_file_join(w->path, name);
+    if (path != NULL) unlink(path);
+    free(path);
+}
+
+bool mospt_writer_commit_part(mospt_writer *w, const mospt_metadata *metadata, uint64_t build,
+                              mospt_err *err)
+{
+    state s;
+    mospt_metadata m = *metadata; /* a loan, but for its files */
+    m.files = NULL, m.file_count = 0;
+    if (!take_state(w, &s, err)) return false;
+    bool ok = true;
+    if (s.written.points > w->committed_points) {
+        m.unfinished = (mospt_unfinished){.commit = w->commit + 1,
+                                          .points = metadata->point_count,
+                                          .points_hash = metadata->points_hash,
+                                          .build = build};
+        m.points_hash = s.written.points_hash;
+        snprintf(m.hierarchy_name, sizeof m.hierarchy_name, UNFINISHED_NAME, w->commit + 1);
+        ok = commit(w, &s, &m, err);
+        if (ok) {
+            remove_state(w, w->commit++);
+            w->committed_points = s.written.points;
+        }
+    }
+    for (uint32_t i = 0; i < m.file_count; i++)
+        free(m.files[i].name);
+    free(m.files);
+    mospt_hierarchy_fini(&s.hierarchy);
+    return ok;
+}
+
+/* An unfinished build may have left more than the dataset has. */
+static bool cut_files(const mospt_writer *w, const state *s, mospt_err *err)
+{
+    for (uint32_t i = 0; i < s->file_count; i++)
+        if (ftruncate(w->fd[i], (off_t)s->size[i]) != 0)
+            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
+                                 PAYLOAD_NAME " cannot be cut", i);
+    return true;
+}
+
+bool mospt_writer_commit(mospt_writer *w, mospt_metadata *metadata, mospt_err *err)
+{
+    state s;
+    assert(w->leading == w->count);
+    metadata->unfinished = (mospt_unfinished){0};
+    snprintf(metadata->hierarchy_name, sizeof metadata->hierarchy_name, "hierarchy-%06u.bin", 1u);
+    if (!take_state(w, &s, err)) return false;
+    w->finished = cut_files(w, &s, err) && commit(w, &s, metadata, err);
+    if (w->finished && w->commit > 0) each_entry(w->path, remove_unfinished, NULL);
+    mospt_hierarchy_fini(&s.hierarchy);
+    return w->finished;
 }
 
 void mospt_writer_destroy(mospt_writer *w)
@@ -190,8 +381,10 @@ void mospt_writer_destroy(mospt_writer *w)
     if (w == NULL) return;
     for (uint32_t i = 0; i < w->file_count; i++)
         close(w->fd[i]);
-    if (!w->committed && each_entry(w->path, remove_ours, NULL)) rmdir(w->path);
-    mospt_hierarchy_fini(&w->hierarchy);
+    bool leaves = w->finished || w->found || w->commit > 0;
+    if (!leaves && each_entry(w->path, remove_ours, NULL)) rmdir(w->path);
+    pthread_mutex_destroy(&w->lock);
+    free(w->nodes);
     free(w->path);
     free(w);
 }

@@ -1,22 +1,36 @@
 /* mospt/writer.h - a dataset folder, being written.
  *
- * Payloads are appended to one file per outer level, in the order in which they come; nothing is a
- * dataset before the commit, which is one rename of metadata.json after all that it names is on the
- * disk. */
+ * Payloads are appended to one file per outer level, in the order in which nodes are given their
+ * places; nothing is a dataset before a commit, which is one rename of metadata.json after all that
+ * it names is on the disk. While a build goes on, what is complete so far may be committed as an
+ * unfinished dataset: readers see each commit as a whole, and an interrupted build goes on from the
+ * last one. The places of nodes depend on their order alone, so whoever goes on, and names the same
+ * nodes in the same order, finds those that are there already where they belong. */
 #pragma once
 #include "mospt/dataset.h"
 
 typedef struct mospt_writer mospt_writer;
 
-/* Makes the folder, or takes over one in which an unfinished build was left.
- * errors   MOSPT_EIO; MOSPT_EINVAL: there is a dataset already, or a folder with other things */
+typedef struct {
+    uint64_t points, points_hash; /* the latter a sum of the hashes of all points */
+} mospt_written;
+
+/* Makes the folder, or takes over one in which an unfinished build was left. An unfinished dataset
+ * there stays as it is until the first node has its place.
+ * errors   MOSPT_EIO; MOSPT_EINVAL: there is a finished dataset, or a folder with other things */
 bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **out,
                          mospt_err *err);
 
-/* Gives a node its place, in the order in which nodes come.
+/* Goes on from the unfinished dataset in the folder instead of removing it. What is written now
+ * must agree with it wherever both have something.
+ * kept     its metadata */
+void mospt_writer_keep(mospt_writer *writer, const mospt_metadata *kept);
+
+/* Gives a node its place, in the order in which nodes come: parents before their children, those of
+ * a level in Morton order.
  * node     corner, level, child_mask, count and payload_size; out: place and index of its file
  * index    out, of the node in the writer
- * threads  one at a time */
+ * threads  any */
 bool mospt_writer_place(mospt_writer *writer, mospt_node *node, uint32_t *index, mospt_err *err);
 
 /* Writes the payload of a node that has its place.
@@ -24,18 +38,31 @@ bool mospt_writer_place(mospt_writer *writer, mospt_node *node, uint32_t *index,
 bool mospt_writer_write(mospt_writer *writer, const mospt_node *node, const uint8_t *payload,
                         mospt_err *err);
 
-/* Says the rest of a node: level_end, and what mospt_payload_pack() sets.
- * threads  one at a time, also with mospt_writer_place() */
-void mospt_writer_complete(mospt_writer *writer, uint32_t index, const mospt_node *node);
+/* Says that a node is written, and the rest of it: level_end, and what mospt_payload_pack() sets.
+ * points_hash  sum of the hashes of its points
+ * threads      any */
+void mospt_writer_complete(mospt_writer *writer, uint32_t index, const mospt_node *node,
+                           uint64_t points_hash);
 
-/* Bytes of payload so far, and nodes. */
+/* Bytes of payload that have their place, and nodes. */
 uint64_t mospt_writer_bytes(const mospt_writer *writer);
 uint32_t mospt_writer_nodes(const mospt_writer *writer);
 
-/* Flushes, writes hierarchy and metadata, and commits.
+/* All nodes that are complete. threads: any */
+mospt_written mospt_writer_written(mospt_writer *writer);
+
+/* Flushes and commits the nodes before the first that is not complete, if these are more points
+ * than at the last commit.
+ * metadata  of the finished dataset, all but files, hierarchy_* and generation
+ * build     see mospt_unfinished
+ * threads   one at a time, while others place, write and complete */
+bool mospt_writer_commit_part(mospt_writer *writer, const mospt_metadata *metadata, uint64_t build,
+                              mospt_err *err);
+
+/* Flushes, writes hierarchy and metadata, and commits the finished dataset; every node is complete.
  * metadata  all but files, hierarchy_* and generation, which are filled in here; files become owned
- * by it */
+ *           by it */
 bool mospt_writer_commit(mospt_writer *writer, mospt_metadata *metadata, mospt_err *err);
 
-/* Frees the writer; without a commit, what it wrote is removed. */
+/* Frees the writer; without any commit, what it wrote is removed. */
 void mospt_writer_destroy(mospt_writer *writer);

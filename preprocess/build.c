@@ -5,7 +5,11 @@
 #include "preprocess/feed.h"
 #include "preprocess/finish.h"
 #include "preprocess/frame.h"
+#include "preprocess/generations.h"
+#include "preprocess/output.h"
 #include "preprocess/plan.h"
+#include "preprocess/provenance.h"
+#include "preprocess/resume.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -17,9 +21,6 @@
 #include <time.h>
 #include <unistd.h>
 
-/* What a dataset is called that will take another one's place. */
-static const char BESIDE[] = ".building";
-
 typedef struct {
     const prep_build_options *options;
     prep_build_result *result;
@@ -30,13 +31,13 @@ typedef struct {
     prep_store *store;
     prep_arena *arena;
     mospt_writer *writer;
-    prep_written written;
+    uint64_t identity;   /* of this build, see prep_provenance_hash() */
+    prep_resume *resume; /* what an interrupted one has left; NULL: nothing */
     prep_phase phase;
     uint64_t points_total; /* 0: unknown */
     double phase_start;
     char *scratch_folder; /* owned */
-    char *target;         /* owned: the folder written to */
-    char *replaced;       /* owned: the dataset whose place it takes at the end; NULL: none */
+    prep_output output;
 } build;
 
 const char *prep_phase_name(prep_phase phase)
@@ -80,50 +81,20 @@ static bool tell_points(void *context, uint64_t points)
     return tell(context, points);
 }
 
-static bool tell_written(void *context, const prep_written *written)
+static bool tell_written(void *context)
 {
-    return tell(context, written->points);
+    build *b = context;
+    return tell(b, mospt_writer_written(b->writer).points);
 }
 
-/* The folder that holds a path, as an owned string. */
-static char *folder_of(const char *path)
-{
-    char *folder = strdup(path);
-    if (folder == NULL) return NULL;
-    size_t n = strlen(folder);
-    while (n > 1 && folder[n - 1] == '/')
-        folder[--n] = '\0';
-    char *slash = strrchr(folder, '/');
-    if (slash == folder) folder[1] = '\0';
-    else if (slash != NULL) *slash = '\0';
-    else strcpy(folder, n > 0 ? "." : "");
-    if (n == 1 && slash == NULL) strcpy(folder, ".");
-    return folder;
-}
-
-/* Where the dataset is written: the output itself, or beside it where that is to be replaced at the
- * end. */
-static bool choose_folders(build *b, mospt_err *err)
+/* The scratch folder, which must be there. */
+static bool choose_scratch(build *b, mospt_err *err)
 {
     const prep_build_options *o = b->options;
-    size_t n = strlen(o->output);
-    while (n > 1 && o->output[n - 1] == '/')
-        n--;
-    if (mospt_dataset_exists(o->output) && !o->force)
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(o->output),
-                             "is a dataset already; --force replaces it");
-    bool replaces = mospt_dataset_exists(o->output);
-    b->target = malloc(n + sizeof BESIDE);
-    b->replaced = replaces ? strndup(o->output, n) : NULL;
-    b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : folder_of(o->output);
-    if (b->target == NULL || b->scratch_folder == NULL || (replaces && b->replaced == NULL))
-        return mospt_err_nomem(err, n);
-    memcpy(b->target, o->output, n);
-    strcpy(b->target + n, replaces ? BESIDE : "");
-    if (access(b->scratch_folder, W_OK | X_OK) != 0)
-        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder),
-                             "cannot be written to");
-    return true;
+    b->scratch_folder = o->temp_dir != NULL ? strdup(o->temp_dir) : prep_output_folder(o->output);
+    if (b->scratch_folder == NULL) return mospt_err_nomem(err, strlen(o->output));
+    if (access(b->scratch_folder, W_OK | X_OK) == 0) return true;
+    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
 }
 
 /* True if a list of names, separated by commas, has this one. */
@@ -210,7 +181,7 @@ static bool check_disks(build *b, mospt_err *err)
         b->options->announce(b->options->context, b->points_total,
                              scratch + b->result->source.spool_size, bytes);
     if (!check_space(b->scratch_folder, scratch, "scratch space", err)) return false;
-    char *folder = folder_of(b->target);
+    char *folder = prep_output_folder(b->output.target);
     bool ok = folder != NULL && check_space(folder, bytes, "the dataset", err);
     free(folder);
     return ok;
@@ -326,6 +297,28 @@ static bool drop_duplicates(build *b, prep_pass_env *env, prep_pass **pass, prep
     return ok;
 }
 
+/* Writes all nodes, and commits them as they are finished. Takes over the pass. */
+static bool write_tree(build *b, prep_pass *pass, const prep_pack_sums *of_scan, mospt_err *err)
+{
+    prep_generations *generations = NULL;
+    if (!prep_provenance_fill(b->metadata, &b->result->source, of_scan, b->options->crs, err)) {
+        prep_pass_abandon(pass);
+        return false;
+    }
+    b->metadata->point_count = b->points_total;
+    if (b->resume != NULL) {
+        const mospt_metadata *kept = prep_resume_metadata(b->resume);
+        b->result->kept_points = kept->point_count;
+        mospt_writer_keep(b->writer, kept);
+    }
+    if (!prep_generations_start(b->writer, b->metadata, b->identity, &generations, err)) {
+        prep_pass_abandon(pass);
+        return false;
+    }
+    bool ok = prep_pass_end(pass, err);
+    return prep_generations_stop(generations, ok ? err : NULL) && ok;
+}
+
 /* Takes over the passes. `*outside` as for stream_points(). */
 static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, bool *outside,
                        mospt_err *err)
@@ -347,7 +340,7 @@ static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, bo
     b->points_total = 0;
     for (uint32_t i = 0; i < source->scan_count; i++)
         b->points_total += source->scans[i].points;
-    if (b->points_total > 0) return prep_pass_end(pass, err);
+    if (b->points_total > 0) return write_tree(b, pass, of_scan, err);
     prep_pass_abandon(pass);
     return mospt_err_set(err, MOSPT_EEMPTY, mospt_nowhere(), "no point could be read");
 }
@@ -360,7 +353,9 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
                             .schema = &b->metadata->schema,
                             .inner_depth = b->metadata->inner_depth,
                             .add_threshold = b->metadata->add_threshold};
-    bool ok = prep_store_create(b->scratch_folder, mospt_record_size(&b->metadata->schema),
+    b->identity = prep_provenance_hash(b->metadata, &b->result->source, b->options->dedupe);
+    bool ok = prep_resume_open(b->output.target, b->identity, b->workers, &b->resume, err) &&
+              prep_store_create(b->scratch_folder, mospt_record_size(&b->metadata->schema),
                                 b->plan.block_size, b->plan.store_memory, &b->store, err) &&
               prep_arena_create(b->plan.solve_memory, &b->arena, err);
     prep_pass_env env = {.shape = &b->shape,
@@ -372,7 +367,7 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
                          .levels = b->plan.levels,
                          .batch_slices = b->plan.batch_slices,
                          .solve_points = b->plan.solve_points,
-                         .written = &b->written,
+                         .resume = b->resume,
                          .report = tell_written,
                          .report_context = b};
     if (b->result->source.spool_size > 0 && env.batch_slices < spooled_slices)
@@ -380,125 +375,26 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
     ok = ok && run_passes(b, &env, of_scan, outside, err);
     if (b->store != NULL)
         b->result->scratch_bytes = prep_store_scratch_peak(b->store) + b->result->source.spool_size;
+    prep_resume_close(b->resume);
     prep_store_destroy(b->store);
     prep_arena_destroy(b->arena);
+    b->resume = NULL;
     b->store = NULL;
     b->arena = NULL;
     return ok;
 }
 
-static bool fill_source(mospt_source *to, const prep_source_scan *from, const prep_pack_sums *sums,
-                        const mospt_grid *grid)
-{
-    bool several = from->info.scan_count > 1;
-    to->name = strdup(from->name);
-    to->scan = strdup(several ? from->info.name : "");
-    to->format = strdup(from->info.format);
-    to->points = from->points;
-    to->has_rgb = from->info.has_rgb;
-    to->has_intensity = from->info.has_intensity;
-    to->has_pose = from->info.has_pose;
-    memcpy(to->pose, from->info.pose, sizeof to->pose);
-    bool ok = to->name != NULL && to->scan != NULL && to->format != NULL;
-    for (int r = 0; r < PREP_DROP_REASONS; r++) {
-        if (from->dropped[r] == 0) continue;
-        to->drop_reason[to->reason_count] = strdup(prep_drop_name((prep_drop)r));
-        ok = ok && to->drop_reason[to->reason_count] != NULL;
-        to->drop_count[to->reason_count++] = from->dropped[r];
-        to->dropped += from->dropped[r];
-    }
-    if (from->damage.code != MOSPT_OK) {
-        char text[2048];
-        mospt_err_text(&from->damage, text, sizeof text);
-        /* The dataset speaks of its sources by their names, wherever the folder was. */
-        const char *after = strstr(text, from->path) == text ? text + strlen(from->path) : NULL;
-        char named[4096];
-        snprintf(named, sizeof named, "%s%s", after != NULL ? from->name : "",
-                 after != NULL ? after : text);
-        to->damage = strdup(named);
-        ok = ok && to->damage != NULL;
-    }
-    for (int a = 0; a < 3 && from->points > 0; a++) {
-        to->low[a] = mospt_grid_axis_to_world(grid, a, sums->low[a]);
-        to->high[a] = mospt_grid_axis_to_world(grid, a, sums->high[a]);
-    }
-    return ok;
-}
-
-static bool keep_crs(mospt_source *to, const char *crs, const char *of_site)
-{
-    if (crs[0] == '\0' || strcmp(crs, of_site) == 0) return true;
-    to->crs = strdup(crs);
-    return to->crs != NULL;
-}
-
-static bool fill_metadata(build *b, const prep_pack_sums *of_scan, mospt_err *err)
-{
-    mospt_metadata *m = b->metadata;
-    const prep_source *source = &b->result->source;
-    prep_pack_sums all = prep_pack_sums_empty;
-    m->sources = calloc(source->scan_count, sizeof *m->sources);
-    if (m->sources == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *m->sources);
-    for (; m->source_count < source->scan_count; m->source_count++) {
-        uint32_t i = m->source_count;
-        prep_pack_sums_add(&all, &of_scan[i]);
-        if (!fill_source(&m->sources[i], &source->scans[i], &of_scan[i], &m->grid)) {
-            m->source_count++;
-            return mospt_err_nomem(err, sizeof *m->sources);
-        }
-    }
-    const char *crs = b->options->crs;
-    for (uint32_t i = 0; crs == NULL && i < source->scan_count; i++)
-        if (source->scans[i].info.crs[0] != '\0') crs = source->scans[i].info.crs;
-    m->crs = strdup(crs != NULL ? crs : "");
-    if (m->crs == NULL) return mospt_err_nomem(err, PREP_CRS_SIZE);
-    for (uint32_t i = 0; i < m->source_count; i++)
-        if (!keep_crs(&m->sources[i], source->scans[i].info.crs, m->crs))
-            return mospt_err_nomem(err, PREP_CRS_SIZE);
-    m->points_hash = all.hash;
-    m->position_error = all.position_error;
-    for (int a = 0; a < 3; a++) {
-        m->low[a] = mospt_grid_axis_to_world(&m->grid, a, all.low[a]);
-        m->high[a] = mospt_grid_axis_to_world(&m->grid, a, all.high[a]);
-    }
-    return true;
-}
-
 /* Conservation of points is not a hope: what was read is what was written. */
 static bool check_conservation(const build *b, const mospt_metadata *m, mospt_err *err)
 {
-    if (b->written.points == b->points_total && b->written.points_hash == m->points_hash)
-        return true;
-    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(b->target),
+    mospt_written written = mospt_writer_written(b->writer);
+    if (written.points == b->points_total && written.points_hash == m->points_hash) return true;
+    return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(b->output.target),
                          "%llu points were read and %llu written, with checksums %016llx and "
-                         "%016llx: this is an error of the program",
-                         (unsigned long long)b->points_total, (unsigned long long)b->written.points,
+                         "%016llx: the scans have changed, or this is an error of the program",
+                         (unsigned long long)b->points_total, (unsigned long long)written.points,
                          (unsigned long long)m->points_hash,
-                         (unsigned long long)b->written.points_hash);
-}
-
-/* Where a file system cannot exchange two folders, the old one waits under a name that nobody has
- * until the new one stands. */
-static bool exchange_in_steps(const char *fresh, const char *old, mospt_err *err)
-{
-    char aside[4096];
-    if (snprintf(aside, sizeof aside, "%s.old-XXXXXX", old) >= (int)sizeof aside ||
-        mkdtemp(aside) == NULL || rename(old, aside) != 0)
-        return mospt_err_set(err, MOSPT_EIO, mospt_at_file(old), "cannot be moved aside");
-    if (rename(fresh, old) == 0 && rename(aside, fresh) == 0) return true;
-    return mospt_err_set(err, MOSPT_EIO, mospt_at_file(fresh),
-                         "cannot be put in place; the old dataset is %s", aside);
-}
-
-/* Puts the new dataset in the place of the old one, in one step where the system can, and removes
- * the old one last. */
-static bool replace_output(build *b, mospt_err *err)
-{
-    if (b->replaced == NULL) return true;
-    if (renameat2(AT_FDCWD, b->target, AT_FDCWD, b->replaced, RENAME_EXCHANGE) != 0 &&
-        !exchange_in_steps(b->target, b->replaced, err))
-        return false;
-    return mospt_file_remove_tree(b->target, err);
+                         (unsigned long long)written.points_hash);
 }
 
 static bool run(build *b, mospt_err *err)
@@ -513,14 +409,11 @@ static bool run(build *b, mospt_err *err)
 
     b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
     b->metadata->add_threshold = PREP_ADD_THRESHOLD;
-    if (!choose_folders(b, err)) return false;
-    /* Killed between its commit and its taking the place of the old one: nobody else has such a
-     * name. */
-    if (b->replaced != NULL && mospt_dataset_exists(b->target) &&
-        !mospt_file_remove_tree(b->target, err))
+    if (!prep_output_choose(o->output, o->force, &b->output, err) || !choose_scratch(b, err))
         return false;
     /* A place that cannot be had is known before the scans are read. */
-    if (!mospt_writer_create(b->target, b->metadata->inner_depth, &b->writer, err)) return false;
+    if (!mospt_writer_create(b->output.target, b->metadata->inner_depth, &b->writer, err))
+        return false;
     if (!prep_folder_list_make(o->inputs, o->input_count, &b->result->files, err)) return false;
     if (!prep_source_open(&b->result->files, &o->scans, b->scratch_folder, source, err))
         return false;
@@ -547,14 +440,28 @@ static bool run(build *b, mospt_err *err)
             goto done;
         }
     }
-    ok = fill_metadata(b, of_scan, err) && check_conservation(b, b->metadata, err);
+    ok = check_conservation(b, b->metadata, err);
     b->result->node_count = mospt_writer_nodes(b->writer);
     b->result->payload_bytes = mospt_writer_bytes(b->writer);
-    ok = ok && mospt_writer_commit(b->writer, b->metadata, err) && replace_output(b, err);
+    ok = ok && mospt_writer_commit(b->writer, b->metadata, err) &&
+         prep_output_take_place(&b->output, err);
     b->result->level_count = b->metadata->file_count;
 done:
     free(of_scan);
     return ok;
+}
+
+/* A person who stops a build wants to know whether that was for nothing. */
+static void say_what_is_left(const build *b, mospt_err *err)
+{
+    mospt_metadata m;
+    if (b->output.target == NULL || !mospt_metadata_read(b->output.target, &m, NULL)) return;
+    if (m.unfinished.commit > 0)
+        mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(),
+                      "stopped with %llu of %llu points in %s; the same command goes on from there",
+                      (unsigned long long)m.point_count, (unsigned long long)m.unfinished.points,
+                      b->output.target);
+    mospt_metadata_fini(&m);
 }
 
 bool prep_build(const prep_build_options *options, prep_build_result *out, mospt_err *err)
@@ -566,10 +473,12 @@ bool prep_build(const prep_build_options *options, prep_build_result *out, mospt
     bool ok = run(&b, err);
     enter(&b, PREP_PHASE_MEASURE);
     out->total_seconds = now() - start;
+    if (!ok && err != NULL && err->code == MOSPT_ECANCELLED) say_what_is_left(&b, err);
     if (getrusage(RUSAGE_SELF, &usage) == 0) out->peak_memory = (uint64_t)usage.ru_maxrss * 1024;
     mospt_writer_destroy(b.writer);
     prep_workers_destroy(b.workers);
-    free(b.scratch_folder), free(b.target), free(b.replaced);
+    prep_output_fini(&b.output);
+    free(b.scratch_folder);
     return ok;
 }
 

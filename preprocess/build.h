@@ -47,6 +47,7 @@ typedef struct {
     prep_source source;      /* scans, what they dropped, and files left out */
     prep_folder_list files;
     uint32_t node_count, level_count;
+    uint64_t kept_points; /* that an interrupted build had left, and need not be written again */
     uint64_t payload_bytes, scratch_bytes, peak_memory;
     double seconds[PREP_PHASES], total_seconds;
 } prep_build_result;
@@ -60,5 +61,6 @@ bool prep_build_left_something_out(const prep_build_result *result);
 /* Builds a dataset.
  * out      released by prep_build_result_fini(), also when the build fails: it says which files
  * were left out errors   MOSPT_EINVAL (output exists, memory too small), MOSPT_EEMPTY (no point in
- * any input), MOSPT_EIO, MOSPT_ECANCELLED; nothing is left behind then */
+ * any input), MOSPT_EIO, MOSPT_ECANCELLED; nothing is left behind then but an
+ *          unfinished dataset, from which the same build goes on */
 bool prep_build(const prep_build_options *options, prep_build_result *out, mospt_err *err);

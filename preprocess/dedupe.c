@@ -110,7 +110,7 @@ static bool take_octant(void *context, prep_spool *spool, const uint32_t corner[
 {
     dedupe *d = context;
     prep_pass *pass = NULL;
-    if (!d->env->report(d->env->report_context, d->env->written))
+    if (!d->env->report(d->env->report_context))
         return mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     if (mospt_cell_bits(d->env->shape->grid, level) == 0) return keep_one(d, spool, err);
     if (spool->count <= d->env->solve_points) return sort_and_keep(d, spool, level, err);

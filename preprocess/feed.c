@@ -48,7 +48,7 @@ bool prep_feed_spool(const prep_pass_env *env, prep_pass *pass, prep_spool *spoo
             if (err != NULL) *err = f.err;
             ok = false;
         }
-        if (ok && !env->report(env->report_context, env->written))
+        if (ok && !env->report(env->report_context))
             ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     }
     pthread_mutex_destroy(&f.lock);

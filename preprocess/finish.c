@@ -9,9 +9,10 @@
 typedef struct {
     const prep_finish_part *part;
     uint64_t count;
-    bool is_solved;         /* under the lock, like the counts below */
-    bool on_heap;           /* its memory is not of the arena, for which it is too large */
-    void *memory;           /* owned: for solving, and records that do not stand in memory */
+    uint32_t kept;  /* its node of what an interrupted build has left; MOSPT_NO_NODE: none */
+    bool is_solved; /* under the lock, like the counts below */
+    bool on_heap;   /* its memory is not of the arena, for which it is too large */
+    void *memory;   /* owned: for solving, and records that do not stand in memory */
     const uint8_t **blocks; /* owned */
     mospt_records records;
     prep_subtree made;
@@ -55,8 +56,30 @@ static uint64_t count_of(const prep_finish_part *part)
 
 static bool report_progress(const prep_pass_env *env, mospt_err *err)
 {
-    if (env->report(env->report_context, env->written)) return true;
+    if (env->report(env->report_context)) return true;
     return mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
+}
+
+/* The node to begin with of a part that need not be made again; MOSPT_NO_NODE if it must be. */
+static uint32_t find_kept(const prep_pass_env *env, const prep_finish_part *part)
+{
+    uint32_t node = prep_resume_find(env->resume, part->corner, part->level);
+    bool is_kept =
+        node != MOSPT_NO_NODE && (part->is_node || prep_resume_is_whole(env->resume, node));
+    return is_kept ? node : MOSPT_NO_NODE;
+}
+
+/* Points that were passed over in reading must be those that are there. */
+static bool check_kept(const prep_pass_env *env, const item *i, mospt_err *err)
+{
+    bool is_right = i->kept == MOSPT_NO_NODE ||
+                    prep_resume_points(env->resume, i->kept, !i->part->is_node) == i->count;
+    for (uint32_t s = 0; i->kept == MOSPT_NO_NODE && s < i->part->spool_count; s++)
+        is_right =
+            is_right && (i->part->spools[s]->count == 0 || i->part->spools[s]->block_count > 0);
+    return is_right || mospt_err_set(err, MOSPT_EFORMAT, mospt_nowhere(),
+                                     "the scans are not those that the interrupted build has read; "
+                                     "remove the unfinished dataset to start anew");
 }
 
 /* Bytes for the blocks of a rejection file, of which those on the disk are read, or for the records
@@ -69,6 +92,7 @@ static size_t records_size(const prep_pass_env *env, const item *i)
 
 static bool take_memory(const prep_pass_env *env, item *i)
 {
+    if (i->kept != MOSPT_NO_NODE) return true;
     size_t size = prep_solve_work_size((uint32_t)i->count) + records_size(env, i);
     i->memory = i->on_heap ? malloc(size) : prep_arena_take(env->arena, size);
     return i->memory != NULL;
@@ -113,6 +137,9 @@ static bool solve_item(const prep_pass_env *env, item *i, mospt_err *err)
 {
     const prep_finish_part *part = i->part;
     uint32_t count = (uint32_t)i->count;
+    if (!check_kept(env, i, err)) return false;
+    if (i->kept != MOSPT_NO_NODE)
+        return prep_resume_list(env->resume, i->kept, !part->is_node, &i->made, err);
     if (!collect_records(env, i, (uint8_t *)i->memory + prep_solve_work_size(count), err))
         return false;
     if (part->is_node)
@@ -131,8 +158,13 @@ static bool place_solved(line *l, mospt_err *err)
         item *i = &l->items[l->next_to_place];
         for (uint32_t n = 0; n < i->made.node_count; n++) {
             uint32_t index;
-            if (!mospt_writer_place(l->env->writer, &i->made.nodes[n].node, &index, err))
-                return false;
+            mospt_node *node = &i->made.nodes[n].node;
+            uint64_t offset = node->payload_offset;
+            if (!mospt_writer_place(l->env->writer, node, &index, err)) return false;
+            if (i->kept != MOSPT_NO_NODE && node->payload_offset != offset)
+                return mospt_err_set(err, MOSPT_EFORMAT, mospt_nowhere(),
+                                     "what an interrupted build has left does not fit; remove the "
+                                     "unfinished dataset to start anew");
             if (n == 0) i->first_index = index;
         }
     }
@@ -142,6 +174,10 @@ static bool place_solved(line *l, mospt_err *err)
 static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, uint64_t *hash,
                       mospt_err *err)
 {
+    if (i->kept != MOSPT_NO_NODE) {
+        *hash = prep_resume_points_hash(env->resume, i->made.nodes[n].first);
+        return true;
+    }
     size_t size = prep_solve_emit_size(env->shape, i->made.nodes[n].node.count);
     if (size > b->size) {
         free(b->memory);
@@ -156,10 +192,7 @@ static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, 
 /* Under the lock: the account of a node that is written. */
 static bool settle_node(line *l, item *i, uint32_t n, uint64_t hash, mospt_err *err)
 {
-    const mospt_node *node = &i->made.nodes[n].node;
-    mospt_writer_complete(l->env->writer, i->first_index + n, node);
-    l->env->written->points += node->count;
-    l->env->written->points_hash += hash;
+    mospt_writer_complete(l->env->writer, i->first_index + n, &i->made.nodes[n].node, hash);
     if (++i->nodes_done == i->made.node_count) {
         l->in_flight--;
         fini_item(l->env, i);
@@ -258,7 +291,8 @@ static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts
     l.items = calloc(part_count, sizeof *l.items);
     if (l.items == NULL) return mospt_err_nomem(err, part_count * sizeof *l.items);
     for (uint32_t i = 0; i < part_count; i++)
-        l.items[i] = (item){.part = &parts[i], .count = count_of(&parts[i])};
+        l.items[i] = (item){
+            .part = &parts[i], .count = count_of(&parts[i]), .kept = find_kept(env, &parts[i])};
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
     prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
@@ -286,7 +320,9 @@ bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_e
     uint32_t begin = 0;
     for (uint32_t i = 0; i < list->part_count; i++) {
         const prep_finish_part *part = &list->parts[i];
-        if (part->is_node || count_of(part) <= env->solve_points) continue;
+        if (part->is_node || count_of(part) <= env->solve_points ||
+            find_kept(env, part) != MOSPT_NO_NODE)
+            continue;
         if (!finish_small(env, list->parts + begin, i - begin, err) ||
             !finish_large(env, part, err))
             return false;
@@ -312,10 +348,10 @@ static bool finish_pile_node(const prep_pass_env *env, const uint32_t corner[3],
     mospt_node *node = &made.nodes[0].node;
     bool ok = mospt_writer_place(env->writer, node, &index, err);
     if (ok) {
-        env->written->points_hash += prep_solve_emit(env->shape, &all, &made, 0, payload);
-        env->written->points += count;
-        mospt_writer_complete(env->writer, index, node);
-        ok = mospt_writer_write(env->writer, node, payload, err) && report_progress(env, err);
+        uint64_t hash = prep_solve_emit(env->shape, &all, &made, 0, payload);
+        ok = mospt_writer_write(env->writer, node, payload, err);
+        if (ok) mospt_writer_complete(env->writer, index, node, hash);
+        ok = ok && report_progress(env, err);
     }
     prep_subtree_fini(&made);
     return ok;

@@ -8,6 +8,8 @@ enum { OCTANTS = 8 };
 
 /* An octant at the end of the pass: what was accepted in it level by level, and what goes below. */
 typedef struct {
+    uint8_t kept;   /* bit for each level, and one more for what goes below: these points are in the
+                       dataset already, and are only counted */
     uint8_t *cells; /* owned bit sets of its finest cells, one per level; NULL: untouched */
     prep_spool accepted[PREP_PASS_LEVELS_MAX];
     prep_spool rejected;
@@ -200,14 +202,37 @@ static uint32_t accepting_level(const prep_pass *p, uint8_t *cells, uint32_t cod
     return take_cell(cells + p->cells_offset[last], cell) ? last : p->levels;
 }
 
+/* Which points of a bucket are in the dataset already: those accepted by nodes that are there on
+ * the way down to it, with what lies in octants that never get a child, and those below if all of
+ * that is there. */
+static uint8_t find_kept(const prep_pass *p, uint32_t b)
+{
+    const prep_resume *resume = p->env->resume;
+    uint32_t corner[3] = {p->corner[0], p->corner[1], p->corner[2]}, j = 0;
+    for (; j < p->levels; j++) {
+        uint32_t node = prep_resume_find(resume, corner, p->level + j),
+                 octant = b >> 3 * (p->levels - 1 - j) & 7;
+        if (node == MOSPT_NO_NODE) return (uint8_t)((1u << j) - 1);
+        if (!prep_resume_has_child(resume, node, octant)) return UINT8_MAX;
+        mospt_cell_child(p->env->shape->grid, corner, p->level + j, octant, corner);
+    }
+    uint32_t below = prep_resume_find(resume, corner, p->level + j);
+    bool is_whole = below != MOSPT_NO_NODE && prep_resume_is_whole(resume, below);
+    return (uint8_t)(is_whole ? UINT8_MAX : (1u << j) - 1);
+}
+
 /* Job: sends the records of one bucket to the levels that accept them, or to the rejection file. */
 static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
 {
     bucket *to = &p->buckets[b];
     size_t stride = p->stride;
-    if (!p->env->divides && to->cells == NULL && (to->cells = calloc(1, p->cells_size)) == NULL) {
-        mospt_err_nomem(&to->err, p->cells_size);
-        return;
+    if (!p->env->divides && to->cells == NULL) {
+        to->kept = find_kept(p, b);
+        to->cells = calloc(1, p->cells_size);
+        if (to->cells == NULL) {
+            mospt_err_nomem(&to->err, p->cells_size);
+            return;
+        }
     }
     for (uint32_t s = 0; s < from->slice_count; s++) {
         const uint8_t *records = records_of(p, from, s);
@@ -218,8 +243,9 @@ static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
             uint32_t j =
                 p->env->divides ? p->levels : accepting_level(p, to->cells, codes[order[i]]);
             prep_spool *spool = j < p->levels ? &to->accepted[j] : &to->rejected;
-            if (!prep_spool_append(p->env->store, spool, records + order[i] * stride, stride,
-                                   &to->err))
+            if (to->kept >> j & 1) spool->count++;
+            else if (!prep_spool_append(p->env->store, spool, records + order[i] * stride, stride,
+                                        &to->err))
                 return;
         }
     }

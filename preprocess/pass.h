@@ -14,6 +14,7 @@
 #pragma once
 #include "mospt/writer.h"
 #include "preprocess/arena.h"
+#include "preprocess/resume.h"
 #include "preprocess/solve.h"
 #include "preprocess/spool.h"
 #include "preprocess/workers.h"
@@ -23,13 +24,8 @@ enum {
     PREP_PASS_SLICE = 8192, /* records that one thread prepares at a time: they fit its cache */
 };
 
-/* What has been written so far. */
-typedef struct {
-    uint64_t points, points_hash;
-} prep_written;
-
 /* Told now and then, by one thread at a time. Returns false to stop the build. */
-typedef bool (*prep_pass_report)(void *context, const prep_written *written);
+typedef bool (*prep_pass_report)(void *context);
 
 typedef struct {
     const prep_shape *shape;
@@ -41,7 +37,7 @@ typedef struct {
     uint32_t levels;       /* of the outer octree that one pass fills, 1 to PREP_PASS_LEVELS_MAX */
     uint32_t batch_slices; /* that one call inserts at most */
     uint64_t solve_points; /* rejection files up to so many points are finished in one go */
-    prep_written *written; /* borrowed, added to */
+    const prep_resume *resume; /* what need not be made again; NULL: nothing */
     prep_pass_report report;
     void *report_context;
 } prep_pass_env;

@@ -225,7 +225,7 @@ static bool draw(walk *w, const queued *q, float nearest_px, uint32_t count, mos
              level = level_for(depth, nearest_px, w->cell_px);
     uint32_t finest = level < depth ? level : depth, density = density_level(n, finest, count);
     for (uint32_t o = 0; o < 8; o++) {
-        uint32_t cells = n->child_mask >> o & 1 ? finest : density;
+        uint32_t cells = (n->child_mask | n->pending_mask) >> o & 1 ? finest : density;
         r->octants[8 * (size_t)r->draw_count + o] = REND_SPLAT | cell_log2(w, n, cells);
     }
     link_to_parent(w, q);

@@ -299,7 +299,7 @@ void core_write(mospt_writer *writer, core_subtree *made)
         uint32_t index;
         CORE_NEED(mospt_writer_place(writer, &made->nodes[i], &index, &err));
         CORE_NEED(mospt_writer_write(writer, &made->nodes[i], payload, &err));
-        mospt_writer_complete(writer, index, &made->nodes[i]);
+        mospt_writer_complete(writer, index, &made->nodes[i], 0);
         payload += size;
     }
 }

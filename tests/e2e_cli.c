@@ -505,7 +505,17 @@ static void check_names_what_is_damaged(void **state)
     free(bytes), free(path);
 }
 
-static void a_signal_stops_a_build_and_leaves_nothing(void **state)
+/* Removes an unfinished dataset, which must be undamaged. */
+static void remove_unfinished(void)
+{
+    if (!is_there("site.ipts/metadata.json")) return;
+    assert_int_equal(run("check site.ipts"), DONE);
+    char *left = core_path(folder, "site.ipts");
+    assert_true(mospt_dataset_is_unfinished(left));
+    core_folder_remove(left);
+}
+
+static void a_signal_stops_a_build_and_leaves_nothing_half_done(void **state)
 {
     static const int signals[] = {SIGINT, SIGTERM};
     uint32_t stopped = 0;
@@ -538,32 +548,44 @@ static void a_signal_stops_a_build_and_leaves_nothing(void **state)
         assert_int_equal(code, FAILED);
         assert_string_equal(out, "");
         assert_non_null(strstr(said, "stopped"));
+        if (is_there("site.ipts/metadata.json")) {
+            assert_non_null(strstr(said, "goes on from there"));
+            remove_unfinished();
+        }
         assert_int_equal(core_entries(folder), 1); /* the scan */
         stopped++;
     }
     assert_true(stopped > 0);
 }
 
-static void a_killed_build_can_be_started_again(void **state)
+static void a_killed_build_goes_on_to_the_same_bytes(void **state)
 {
     (void)state;
-    make_las("a.las", 600000);
-    for (int k = 0; k < 3; k++) {
-        pid_t child = start("build a.las -o site.ipts --threads 2", 0);
-        nanosleep(&(struct timespec){.tv_nsec = 30000000L << k}, NULL);
+    make_las("a.las", 2000000);
+    expect("build a.las -o whole.ipts", DONE);
+    for (int k = 0; k < 8; k++) {
+        pid_t child = start(k % 2 ? "build a.las -o site.ipts --threads 1 --memory 64M"
+                                  : "build a.las -o site.ipts --threads 2",
+                            0);
+        nanosleep(&(struct timespec){.tv_sec = k / 7, .tv_nsec = 7000000L << k % 7}, NULL);
         kill(child, SIGKILL);
         waitpid(child, NULL, 0);
+        if (is_there("site.ipts/metadata.json")) {
+            expect("check site.ipts", DONE);
+            expect("info site.ipts", DONE);
+        }
     }
-    if (!is_there("site.ipts/metadata.json")) expect("build a.las -o site.ipts", DONE);
-    expect("check site.ipts", DONE);
-    char *path = core_path(folder, "site.ipts");
+    run("build a.las -o site.ipts"); /* refused if it was done */
+    char *whole = core_path(folder, "whole.ipts"), *path = core_path(folder, "site.ipts");
+    core_assert_same_folders(whole, path);
+    core_folder_remove(whole);
     core_folder_remove(path);
     unlink((path = core_path(folder, "stdout"))), free(path);
     unlink((path = core_path(folder, "stderr"))), free(path);
     assert_int_equal(core_entries(folder), 1);
 }
 
-static void a_full_disk_is_one_sentence_and_leaves_nothing(void **state)
+static void a_full_disk_is_one_sentence_and_leaves_nothing_half_done(void **state)
 {
     static const size_t limits[] = {5000, 100000, 1500000};
     (void)state;
@@ -573,6 +595,7 @@ static void a_full_disk_is_one_sentence_and_leaves_nothing(void **state)
         assert_int_equal(finish(start("build a.las -o site.ipts -q", limits[k])), FAILED);
         assert_string_equal(out, "");
         if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0) fail_msg("%s", said);
+        remove_unfinished();
         assert_int_equal(core_entries(folder), 1);
     }
     signal(SIGXFSZ, SIG_DFL);
@@ -607,9 +630,9 @@ int main(int argc, char **argv)
         CASE(input_left_out_is_exit_code_3),
         CASE(failures_are_exit_code_1_and_one_sentence),
         CASE(check_names_what_is_damaged),
-        CASE(a_signal_stops_a_build_and_leaves_nothing),
-        CASE(a_killed_build_can_be_started_again),
-        CASE(a_full_disk_is_one_sentence_and_leaves_nothing),
+        CASE(a_signal_stops_a_build_and_leaves_nothing_half_done),
+        CASE(a_killed_build_goes_on_to_the_same_bytes),
+        CASE(a_full_disk_is_one_sentence_and_leaves_nothing_half_done),
         CASE(a_limit_on_the_size_of_files_is_like_a_full_disk),
     };
     if (argc < 2) return 2;

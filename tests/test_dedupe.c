@@ -90,9 +90,9 @@ typedef struct {
     size_t block_size, store_memory, solve_memory;
 } way;
 
-static bool go_on(void *context, const prep_written *written)
+static bool go_on(void *context)
 {
-    (void)context, (void)written;
+    (void)context;
     return true;
 }
 
@@ -105,7 +105,6 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
     prep_spool all = {0}, kept = {0};
     prep_dedupe_scan scans[2];
     mospt_err err = {0};
-    prep_written written = {0};
     prep_shape shape = core_shape(site, 5, 100);
     CORE_NEED(prep_workers_create(y->threads, &workers, &err));
     CORE_NEED(
@@ -119,7 +118,6 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
                          .levels = y->levels,
                          .batch_slices = 1,
                          .solve_points = y->solve_memory / prep_finish_size(site->stride, 1),
-                         .written = &written,
                          .report = go_on};
     for (uint32_t i = 0; i < site->count; i++)
         CORE_NEED(

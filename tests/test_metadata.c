@@ -33,6 +33,10 @@ static mospt_metadata make(const char *name)
 {
     mospt_metadata m = {
         .generation = INT64_MAX,
+        .unfinished = {.commit = 3,
+                       .points = UINT64_C(123456789012346),
+                       .points_hash = UINT64_C(0x8000000000000001),
+                       .build = UINT64_MAX},
         .inner_depth = 7,
         .add_threshold = 4096,
         .point_count = UINT64_C(123456789012345),
@@ -85,6 +89,7 @@ static void assert_same(const mospt_metadata *a, const mospt_metadata *b, const 
 {
     assert_true(a->generation == b->generation && a->point_count == b->point_count &&
                 a->points_hash == b->points_hash);
+    assert_memory_equal(&a->unfinished, &b->unfinished, sizeof a->unfinished);
     assert_memory_equal(&a->grid, &b->grid, sizeof a->grid);
     assert_int_equal(a->schema.count, b->schema.count);
     assert_int_equal(a->schema.row_size, b->schema.row_size);
@@ -279,6 +284,9 @@ static void a_liar_with_the_right_checksum_is_refused(void **state)
         {"\"not finite\": 17", "\"not finite\": \"many\""},
         {"\"points\": 1000", "\"points\": -1000"},
         {"\"generation\": 9223372036854775807", "\"generation\": 0"},
+        {"\"commit\": 3", "\"commit\": 0"},
+        {"\"build\": \"f", "\"build\": \""},
+        {"\"unfinished\": {", "\"unfinished\": {}, \"old\": {"},
         {"\"attributes\"", "\"attributed\""},
         {"\"sources\"", "\"source\""},
         {"\"payloads\"", "\"payload\""},

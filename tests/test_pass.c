@@ -16,11 +16,23 @@ typedef struct {
     size_t block_size, store_memory, solve_memory;
 } way;
 
-static bool go_on(void *context, const prep_written *written)
+/* Who stops a build, after so many reports. */
+typedef struct {
+    uint32_t reports_left;
+    bool commits; /* what is there by then stays */
+    mospt_writer *writer;
+    const mospt_metadata *metadata;
+} stopper;
+
+static const uint64_t BUILD = 77; /* any number */
+
+static bool go_on(void *context)
 {
-    (void)written;
-    uint32_t *left = context;
-    return left == NULL || (*left)-- > 0;
+    stopper *s = context;
+    mospt_err err = {0};
+    if (s == NULL || s->reports_left-- > 0) return true;
+    if (s->commits) CORE_NEED(mospt_writer_commit_part(s->writer, s->metadata, BUILD, &err));
+    return false;
 }
 
 /* Records [begin, begin + count) of a site as a batch. */
@@ -38,21 +50,25 @@ static uint32_t feed_slice(void *context, uint32_t slice, uint8_t *records)
     return n;
 }
 
-/* Builds the site; `reports_left` NULL: until the end. */
+/* Builds the site, or goes on from what is there of it; `stop` NULL: until the end. */
 static bool pass_build(const core_site *site, const prep_shape *shape, const way *w,
-                       const char *path, const char *scratch, uint32_t *reports_left,
-                       mospt_err *err)
+                       const char *path, const char *scratch, stopper *stop, mospt_err *err)
 {
     prep_workers *workers = NULL;
     prep_store *store = NULL;
     mospt_writer *writer = NULL;
     prep_pass *pass = NULL;
-    prep_written written = {0};
+    prep_resume *resume = NULL;
     mospt_metadata metadata;
+    core_metadata_make(site, shape->add_threshold, &metadata);
+    metadata.point_count = site->count;
     assert_true(prep_workers_create(w->threads, &workers, err));
     assert_true(
         prep_store_create(scratch, site->stride, w->block_size, w->store_memory, &store, err));
     assert_true(mospt_writer_create(path, shape->inner_depth, &writer, err));
+    assert_true(prep_resume_open(path, BUILD, workers, &resume, err));
+    if (resume != NULL) mospt_writer_keep(writer, prep_resume_metadata(resume));
+    if (stop != NULL) stop->writer = writer, stop->metadata = &metadata;
     prep_arena *arena = NULL;
     assert_true(prep_arena_create(w->solve_memory, &arena, err));
     prep_pass_env env = {.shape = shape,
@@ -63,9 +79,9 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
                          .arena = arena,
                          .batch_slices = (w->batch + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE,
                          .solve_points = w->solve_memory / prep_finish_size(site->stride, 1),
-                         .written = &written,
+                         .resume = resume,
                          .report = go_on,
-                         .report_context = reports_left};
+                         .report_context = stop};
     bool ok = prep_pass_begin(&env, site->grid.root, 0, &pass, err);
     for (uint32_t i = 0; ok && i < site->count; i += w->batch) {
         uint32_t left = site->count - i;
@@ -76,12 +92,12 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     if (ok) ok = prep_pass_end(pass, err);
     else prep_pass_abandon(pass);
     if (ok) {
-        core_metadata_make(site, shape->add_threshold, &metadata);
-        assert_int_equal(written.points, site->count);
-        assert_true(written.points_hash == metadata.points_hash);
+        assert_int_equal(mospt_writer_written(writer).points, site->count);
+        assert_true(mospt_writer_written(writer).points_hash == metadata.points_hash);
         ok = mospt_writer_commit(writer, &metadata, err);
-        mospt_metadata_fini(&metadata);
     }
+    mospt_metadata_fini(&metadata);
+    prep_resume_close(resume);
     mospt_writer_destroy(writer);
     prep_store_destroy(store);
     prep_arena_destroy(arena);
@@ -231,7 +247,7 @@ static void stopping_at_any_report_is_a_cancellation(void **state)
         mospt_err err = {0};
         way w = {
             .levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000};
-        uint32_t left = stop_after;
+        stopper left = {.reports_left = stop_after};
         if (pass_build(&site, &shape, &w, got, folder, &left, &err)) break;
         assert_int_equal(err.code, MOSPT_ECANCELLED);
         assert_false(core_exists(got));
@@ -241,6 +257,102 @@ static void stopping_at_any_report_is_a_cancellation(void **state)
     core_folder_remove(got);
     core_site_fini(&site);
     assert_int_equal(core_entries(folder), 0);
+}
+
+/* Stops a build again and again, each time a little later and building in another way, and checks
+ * what is there in between. Returns how often there was something. */
+static uint32_t interrupt(const core_site *site, const prep_shape *shape, uint32_t more,
+                          const char *path)
+{
+    static const way ways[] = {
+        {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000},
+        {.levels = 1, .threads = 1, .batch = 6000, .block_size = 900, .solve_memory = 1 << 30},
+        {.levels = 3, .threads = 7, .batch = 777, .block_size = 64, .store_memory = 1 << 30},
+    };
+    uint32_t found = 0;
+    uint64_t points = 0;
+    for (uint32_t k = 0;; k++) {
+        mospt_err err = {0};
+        stopper stop = {.reports_left = k * more, .commits = true};
+        if (pass_build(site, shape, &ways[k % 3], path, folder, &stop, &err)) return found;
+        assert_int_equal(err.code, MOSPT_ECANCELLED);
+        if (!core_exists(path)) continue;
+        mospt_metadata m;
+        assert_true(mospt_dataset_is_unfinished(path));
+        assert_int_equal(core_findings(path, &err), 0);
+        CORE_NEED(mospt_metadata_read(path, &m, &err));
+        assert_int_equal(m.unfinished.points, site->count);
+        assert_true(m.point_count >= points && m.point_count <= site->count);
+        points = m.point_count;
+        mospt_metadata_fini(&m);
+        found++;
+    }
+}
+
+static void an_interrupted_build_goes_on_to_the_same_bytes(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < CORE_KINDS; kind++) {
+        core_site site;
+        core_site_make((core_kind)kind, 16, 6000, (uint64_t)kind, &site);
+        char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+        prep_shape shape = core_shape(&site, 3, 30);
+        core_dataset_make(&site, 3, 30, want);
+        uint32_t found = interrupt(&site, &shape, 7, got);
+        assert_true(found > 1 || kind == CORE_ONE_POSITION || kind == CORE_IDENTICAL);
+        core_assert_same_folders(want, got);
+        core_folder_remove(want);
+        core_folder_remove(got);
+        core_site_fini(&site);
+    }
+    assert_int_equal(core_entries(folder), 0);
+}
+
+static void what_is_damaged_is_made_again(void **state)
+{
+    (void)state;
+    core_site site;
+    core_site_make(CORE_CLUSTERED, 16, 6000, 5, &site);
+    prep_shape shape = core_shape(&site, 3, 30);
+    char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+    const way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
+    mospt_err err = {0};
+    core_dataset_make(&site, 3, 30, want);
+    stopper stop = {.reports_left = 60, .commits = true};
+    CORE_FAILS(pass_build(&site, &shape, &w, got, folder, &stop, &err), MOSPT_ECANCELLED);
+    for (int level = 0; level < 3; level++) {
+        char *path = core_path(got, "points-%02d.bin", level);
+        size_t size;
+        uint8_t *bytes = core_file_read(path, &size);
+        bytes[size / 2] ^= 1;
+        core_file_write(path, bytes, size);
+        free(bytes), free(path);
+    }
+    assert_true(core_findings(got, NULL) > 0);
+    CORE_NEED(pass_build(&site, &shape, &w, got, folder, NULL, &err));
+    core_assert_same_folders(want, got);
+    core_folder_remove(want);
+    core_folder_remove(got);
+    core_site_fini(&site);
+}
+
+static void points_that_have_changed_are_an_error(void **state)
+{
+    (void)state;
+    core_site site, other;
+    core_site_make(CORE_CLUSTERED, 16, 6000, 5, &site);
+    core_site_make(CORE_CLUSTERED, 16, 6000, 6, &other);
+    prep_shape shape = core_shape(&site, 3, 30);
+    char *got = core_path(folder, "got.ipts");
+    const way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
+    mospt_err err = {0};
+    stopper stop = {.reports_left = 60, .commits = true};
+    CORE_FAILS(pass_build(&site, &shape, &w, got, folder, &stop, &err), MOSPT_ECANCELLED);
+    CORE_FAILS(pass_build(&other, &shape, &w, got, folder, NULL, &err), MOSPT_EFORMAT);
+    assert_int_equal(core_findings(got, NULL), 0); /* of the first site */
+    core_folder_remove(got);
+    core_site_fini(&site);
+    core_site_fini(&other);
 }
 
 static void a_scratch_disk_that_fills_up_is_an_error(void **state)
@@ -298,6 +410,9 @@ int main(void)
         cmocka_unit_test(deep_trees_of_neighbours_give_the_same_bytes),
         cmocka_unit_test(piles_give_the_same_bytes),
         cmocka_unit_test(stopping_at_any_report_is_a_cancellation),
+        cmocka_unit_test(an_interrupted_build_goes_on_to_the_same_bytes),
+        cmocka_unit_test(what_is_damaged_is_made_again),
+        cmocka_unit_test(points_that_have_changed_are_an_error),
         cmocka_unit_test(a_scratch_disk_that_fills_up_is_an_error),
         cmocka_unit_test(a_scratch_folder_that_is_not_there_is_an_error),
     };
