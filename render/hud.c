@@ -83,7 +83,8 @@ static bool warning_line(const rend_hud *hud, char line[LINE_MAX])
 
 static void help_box(labels *l, const rgl_text *text, uint32_t width, uint32_t height)
 {
-    float advance = rgl_text_advance(text), line = rgl_text_line_height(text), pad = line;
+    rgl_metrics m = rgl_text_metrics(text);
+    float advance = m.advance, line = m.line, pad = line;
     size_t longest = 0;
     for (int i = 0; i < HELP_COUNT; i++)
         if (strlen(HELP[i]) > longest) longest = strlen(HELP[i]);
@@ -101,7 +102,8 @@ bool rend_hud_draw(rgl_text *text, const rend_hud *hud, uint32_t width, uint32_t
 {
     labels l = {.count = 0};
     char figures[LINE_MAX], warning[LINE_MAX];
-    float line = rgl_text_line_height(text), advance = rgl_text_advance(text), pad = line / 3;
+    rgl_metrics m = rgl_text_metrics(text);
+    float line = m.line, advance = m.advance, pad = line / 3;
     static const char hint[] = "H help";
     figures_line(hud, figures);
     panel(&l, 0, 0, (float)width, line + 2 * pad);

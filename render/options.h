@@ -20,12 +20,32 @@ typedef struct {
     double fov_deg;           /* vertical, 1 to 170; 60 without it */
 } rend_camera_options;
 
+/* What colours show. */
 typedef enum {
     REND_COLOUR_RGB,
-    REND_COLOUR_INTENSITY,
+    REND_COLOUR_INTENSITY, /* as it was stretched when the scan was read; with a range, the raw one
+                            */
     REND_COLOUR_ELEVATION,
+    REND_COLOUR_CLASSIFICATION,
+    REND_COLOUR_RETURN,
+    REND_COLOUR_TIME,
+    REND_COLOUR_SCAN,
+    REND_COLOUR_DENSITY,  /* level of the deepest node at a place */
+    REND_COLOUR_DISTANCE, /* to the scanner */
+    REND_COLOUR_ATTRIBUTE,
     REND_COLOUR_COUNT
 } rend_colour;
+
+typedef enum {
+    REND_MAP_USUAL, /* grey for intensity, viridis for all else */
+    REND_MAP_VIRIDIS,
+    REND_MAP_TURBO,
+    REND_MAP_INFERNO,
+    REND_MAP_GREY,
+    REND_MAP_DIVERGING,
+    REND_MAP_COUNT
+} rend_map;
+
 typedef enum {
     REND_SIZE_AUTO,  /* splat size follows the cells that are drawn, section 5.3 of the paper */
     REND_SIZE_FIXED, /* point_px pixels for every point */
@@ -38,6 +58,13 @@ typedef struct {
     float point_m;      /* REND_SIZE_WORLD, in the unit of the world coordinates */
     float point_px_max; /* no splat is larger; 0: REND_POINT_PX_MAX_DEFAULT */
     rend_colour colour;
+    const char *attribute; /* REND_COLOUR_ATTRIBUTE: its name, borrowed; "NAME:2" is the second of
+                              its components */
+    bool has_range;        /* without it all but the lowest and highest hundredth of the values */
+    double range[2];       /* values at both ends of the colour map, in the unit of the values */
+    rend_map map;
+    double brightness;   /* factor on stored colours; 0: 1 */
+    double gamma;        /* above 1 lifts the dark ones; 0: 1 */
     bool no_edl;         /* eye-dome lighting off */
     float edl_strength;  /* 0: 1; 2 is twice as dark */
     float edl_radius_px; /* 0: 1 pixel for each 720 of the picture's height, and at least 1 */
