@@ -1,5 +1,8 @@
 #include "cli_options.h"
 
+#include "render/choice.h"
+#include "render/ramp.h"
+
 #include <ctype.h>
 #include <getopt.h>
 #include <math.h>
@@ -256,15 +259,37 @@ static bool o_size(cli_options *o, const char *v)
            o->height <= REND_SIZE_MAX;
 }
 
+/* Whether the scans have such an attribute is known when they have been read. */
 static bool o_colour(cli_options *o, const char *v)
 {
-    static const char *const names[REND_COLOUR_COUNT] = {"rgb", "intensity", "elevation"};
-    for (int i = 0; i < REND_COLOUR_COUNT; i++) {
-        if (strcmp(v, names[i]) != 0) continue;
-        o->look.colour = (rend_colour)i;
-        return true;
-    }
-    return false;
+    rend_choice_read(v, &o->look);
+    return v[0] != '\0';
+}
+
+static bool o_colour_range(cli_options *o, const char *v)
+{
+    double *r = o->look.range;
+    int used = 0;
+    o->look.has_range = sscanf(v, "%lf,%lf%n", &r[0], &r[1], &used) == 2 && v[used] == '\0' &&
+                        isfinite(r[0]) && isfinite(r[1]) && r[0] < r[1];
+    return o->look.has_range;
+}
+
+static bool o_colour_map(cli_options *o, const char *v)
+{
+    return rend_ramp_from_name(v, &o->look.map);
+}
+static bool o_brightness(cli_options *o, const char *v)
+{
+    return read_real(v, 0.01, 100, &o->look.brightness);
+}
+static bool o_gamma(cli_options *o, const char *v)
+{
+    return read_real(v, 0.1, 10, &o->look.gamma);
+}
+static bool o_legend(cli_options *o, const char *v)
+{
+    return (void)v, o->legend = true;
 }
 
 static const struct {
@@ -305,8 +330,18 @@ static const struct {
      "nodes that are smaller on the screen are not drawn (default: by detail)"},
     {"point-size", "SIZE", 0, V | S, o_point_size,
      "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
-    {"color", "BY", 0, V | S, o_colour, "rgb, intensity or elevation (default: rgb)"},
+    {"color", "BY", 0, V | S, o_colour,
+     "rgb (default), intensity, elevation, classification, return, time, scan, density, distance, "
+     "or "
+     "an attribute"},
     {"colour", "BY", 0, V | S, o_colour, NULL},
+    {"color-range", "A,B", 0, V | S, o_colour_range,
+     "values at both ends of the colours (default: all but the lowest and highest hundredth)"},
+    {"color-map", "NAME", 0, V | S, o_colour_map,
+     "viridis, turbo, inferno, grey or diverging (default: grey for intensity, else viridis)"},
+    {"brightness", "FACTOR", 0, V | S, o_brightness, "of RGB colours (default: 1)"},
+    {"gamma", "G", 0, V | S, o_gamma, "of RGB colours; above 1 lifts the dark ones (default: 1)"},
+    {"legend", NULL, 0, S, o_legend, "what the colours mean, in the picture"},
     {"no-edl", NULL, 0, V | S, o_no_edl, "without eye-dome lighting"},
     {"size", "WxH", 0, V | S, o_size, "of the picture or window, pixels (default: 1280x720)"},
     {"eye", "X,Y,Z", 0, V | S, o_eye, "where the camera stands, in the coordinates of the scans"},

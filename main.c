@@ -5,6 +5,7 @@
 
 #include "mospt/check.h"
 #include "mospt/file.h"
+#include "render/scheme.h"
 #include "render/shot.h"
 #include "render/view.h"
 
@@ -277,6 +278,15 @@ static void place_close(place *p)
     if (p->folder[0] != '\0') mospt_file_remove_tree(p->folder, NULL);
 }
 
+/* Colours that the dataset cannot show are a wrong use, and known before anything is drawn. */
+static bool has_colours(const cli_options *o, place *p)
+{
+    mospt_err err = {0};
+    if (rend_scheme_fits(p->dataset, &o->look, &err)) return true;
+    p->code = misuse(o->command, err.message);
+    return false;
+}
+
 static void warn_of_damage(uint32_t nodes, const mospt_err *first)
 {
     char text[2048];
@@ -317,15 +327,17 @@ static int command_shot(const cli_options *o)
                                        .height = o->height,
                                        .camera = o->camera,
                                        .look = o->look,
+                                       .legend = o->legend,
                                        .limits = o->limits};
-    bool ok = place_open(o, NULL, &p, &err) && rend_shot(p.dataset, &options, &result, &err);
+    bool opened = place_open(o, NULL, &p, &err), fits = opened && has_colours(o, &p);
+    bool ok = fits && rend_shot(p.dataset, &options, &result, &err);
     if (ok) {
         report_shot(o, &result);
         warn_of_damage(result.damaged_nodes, &result.damage);
         if (result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     }
     place_close(&p);
-    return ok ? p.code : fail(&err);
+    return ok || (opened && !fits) ? p.code : fail(&err);
 }
 
 static int command_view(const cli_options *o)
@@ -342,13 +354,14 @@ static int command_view(const cli_options *o)
                                        .frames = o->frames,
                                        .screenshot = o->screenshot,
                                        .should_stop = should_stop};
-    bool ok = place_open(o, o->output, &p, &err) && rend_view(p.dataset, &options, &result, &err);
+    bool opened = place_open(o, o->output, &p, &err), fits = opened && has_colours(o, &p);
+    bool ok = fits && rend_view(p.dataset, &options, &result, &err);
     if (ok) warn_of_damage(result.damaged_nodes, &result.damage);
     if (ok && result.no_words.code != MOSPT_OK)
         fail(&result.no_words); /* the picture was there all the same */
     if (ok && result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     place_close(&p);
-    return ok ? p.code : fail(&err);
+    return ok || (opened && !fits) ? p.code : fail(&err);
 }
 
 typedef struct {

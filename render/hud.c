@@ -12,14 +12,22 @@ static const char *const HELP[] = {
     "R                  reset the view",
     "B  shift B  ] [    more, fewer points (budget)",
     "+ -                larger, smaller points;  0  automatic",
-    "C  1 2 3           colour: RGB, intensity, elevation",
+    "C  shift C         next, previous colours: all that the points carry",
+    "1 2 3 4 5          RGB, intensity, elevation, classification, return",
+    "6 7 8 9            time, scan, density, distance to the scanner",
+    "M  K               next colour map;  legend on and off",
+    ", .                darker, brighter RGB",
     "L                  eye-dome lighting",
     "P                  save a picture",
     "F                  full screen",
     "H  F1              this help",
     "Esc  ctrl W        quit",
 };
-enum { HELP_COUNT = sizeof HELP / sizeof *HELP, LABELS_MAX = HELP_COUNT + 8, LINE_MAX = 512 };
+enum {
+    HELP_COUNT = sizeof HELP / sizeof *HELP,
+    LABELS_MAX = HELP_COUNT + 8 + REND_LEGEND_LABELS_MAX,
+    LINE_MAX = 512
+};
 
 static const float WHITE[4] = {1, 1, 1, 1}, ORANGE[4] = {1, 0.75f, 0.35f, 1},
                    SHADE[4] = {0.05f, 0.06f, 0.07f, 0.72f};
@@ -114,6 +122,9 @@ bool rend_hud_draw(rgl_text *text, const rend_hud *hud, uint32_t width, uint32_t
         panel(&l, 0, line + 2 * pad, (float)strlen(warning) * advance + 2 * pad, line + 2 * pad);
         words(&l, pad, line + 3 * pad, ORANGE, warning);
     }
+    if (hud->legend != NULL)
+        l.count +=
+            rend_legend_labels(hud->legend, &m, width, height, line + 2 * pad, l.at + l.count);
     if (hud->help) help_box(&l, text, width, height);
     return rgl_text_draw(text, width, height, l.at, l.count, err);
 }

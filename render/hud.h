@@ -1,4 +1,5 @@
-/* render/hud.h - the words over the picture in a window: one line of figures, and the help. */
+/* render/hud.h - the words over the picture in a window: one line of figures, the legend of
+ * the colours, and the help. */
 #pragma once
 #include "render/gl/text.h"
 #include "render/stage.h"
@@ -7,8 +8,9 @@ typedef struct {
     rend_figures figures;
     double frame_ms;
     uint64_t budget_points;
-    const char *look;   /* what was set by hand: colour mode, splat size */
-    const char *notice; /* something that just happened; "": nothing */
+    const char *look;          /* what was set by hand: colour mode, splat size */
+    const char *notice;        /* something that just happened; "": nothing */
+    const rend_legend *legend; /* NULL: not shown */
     bool help;
 } rend_hud;
 

@@ -8,7 +8,8 @@ enum { THREADS_MAX = 16 };
 
 typedef struct finished {
     rend_loaded loaded;
-    uint64_t size;
+    uint64_t size;       /* of the vertices */
+    uint64_t bytes_read; /* with attributes */
     struct finished *next;
 } finished;
 
@@ -21,14 +22,17 @@ struct rend_loader {
     uint32_t thread_count;
 
     /* Guarded by `lock`: all that follows. A node is in at most one of `wanted`, being read, and
-     * the finished list: `busy` marks the last two. A thread touches a node's vertices only between
-     * beginning to read it and appending the result. */
+     * the finished list: `busy` says of the last two with which paint, by its number from 1, or 0.
+     * A thread touches a node's vertices only between beginning to read it and appending the
+     * result. */
     pthread_mutex_t lock;
     pthread_cond_t work; /* there may be something to read, or room to put it, or `quit` */
     pthread_cond_t done; /* something was finished */
     uint32_t *wanted;    /* [wanted_count], owned; next_wanted is the most urgent one left */
     uint32_t wanted_count, wanted_capacity, next_wanted;
-    bool *busy; /* [node count], owned */
+    uint32_t *busy; /* [node count], owned */
+    rend_paint paint;
+    uint32_t paint_number;
     uint32_t reading;
     finished *first, **last;
     uint32_t finished_count;
@@ -40,19 +44,39 @@ struct rend_loader {
 /* The most urgent node that nobody reads yet; false if there is none, or no room for it. */
 static bool begin(rend_loader *l, uint32_t *node)
 {
-    while (l->next_wanted < l->wanted_count && l->busy[l->wanted[l->next_wanted]])
+    while (l->next_wanted < l->wanted_count &&
+           l->busy[l->wanted[l->next_wanted]] == l->paint_number)
         l->next_wanted++;
     if (l->next_wanted == l->wanted_count) return false;
     uint64_t size = mospt_dataset_vertices_size(l->dataset, l->wanted[l->next_wanted]);
     if (l->waiting_bytes > 0 && l->waiting_bytes + size > l->waiting_limit) return false;
     *node = l->wanted[l->next_wanted++];
-    l->busy[*node] = true;
+    l->busy[*node] = l->paint_number;
     l->reading++;
     l->waiting_bytes += size;
     return true;
 }
 
-static finished *read_node(const mospt_dataset *dataset, uint32_t node)
+/* Reads what the paint asks for. */
+static bool read_painted(const mospt_dataset *dataset, const rend_paint *paint, uint32_t node,
+                         finished *f, mospt_err *err)
+{
+    uint8_t *planes = NULL;
+    size_t planes_size = 0;
+    bool ok = mospt_dataset_read_vertices(dataset, node, f->loaded.vertices, err);
+    if (ok && rend_paint_needs_attributes(paint)) {
+        planes_size = dataset->hierarchy.nodes[node].count * dataset->metadata.schema.row_size;
+        planes = malloc(planes_size + 1);
+        ok = planes != NULL ? mospt_dataset_read_attributes(dataset, node, planes, err)
+                            : mospt_err_nomem(err, planes_size);
+    }
+    if (ok) rend_paint_apply(paint, node, planes, f->loaded.vertices);
+    free(planes);
+    f->bytes_read = f->size + planes_size;
+    return ok;
+}
+
+static finished *read_node(const mospt_dataset *dataset, const rend_paint *paint, uint32_t node)
 {
     finished *f = calloc(1, sizeof *f);
     if (f == NULL) return NULL;
@@ -61,23 +85,33 @@ static finished *read_node(const mospt_dataset *dataset, uint32_t node)
     f->loaded.vertices = malloc(f->size > 0 ? f->size : 1);
     if (f->loaded.vertices == NULL) {
         mospt_err_nomem(&f->loaded.err, f->size);
-    } else if (!mospt_dataset_read_vertices(dataset, node, f->loaded.vertices, &f->loaded.err)) {
+    } else if (!read_painted(dataset, paint, node, f, &f->loaded.err)) {
         free(f->loaded.vertices);
         f->loaded.vertices = NULL;
     }
     return f;
 }
 
-/* Without memory even for the result, the node is as if nobody had asked; the next frame asks
- * again. */
-static void finish(rend_loader *l, uint32_t node, finished *f)
+static void discard(rend_loader *l, finished *f)
 {
+    l->waiting_bytes -= f->size;
+    free(f->loaded.vertices);
+    free(f);
+}
+
+/* Without memory even for the result, or painted as nobody wants it any more, the node is as if
+ * nobody had asked; the next frame asks again. */
+static void finish(rend_loader *l, uint32_t node, uint32_t paint_number, finished *f)
+{
+    bool forgotten = f == NULL || paint_number != l->paint_number;
     l->reading--;
+    if (forgotten && l->busy[node] == paint_number) l->busy[node] = 0;
     if (f == NULL) {
-        l->busy[node] = false;
         l->waiting_bytes -= mospt_dataset_vertices_size(l->dataset, node);
+    } else if (forgotten) {
+        discard(l, f);
     } else {
-        if (f->loaded.vertices != NULL) l->bytes += f->size;
+        if (f->loaded.vertices != NULL) l->bytes += f->bytes_read;
         *l->last = f, l->last = &f->next;
         l->finished_count++;
     }
@@ -94,10 +128,12 @@ static void *work(void *argument)
             pthread_cond_wait(&l->work, &l->lock);
             continue;
         }
+        rend_paint paint = l->paint;
+        uint32_t paint_number = l->paint_number;
         pthread_mutex_unlock(&l->lock);
-        finished *f = read_node(l->dataset, node);
+        finished *f = read_node(l->dataset, &paint, node);
         pthread_mutex_lock(&l->lock);
-        finish(l, node, f);
+        finish(l, node, paint_number, f);
         pthread_mutex_unlock(&l->lock);
         if (l->wake != NULL) l->wake(l->user);
         pthread_mutex_lock(&l->lock);
@@ -113,6 +149,7 @@ bool rend_loader_create(const mospt_dataset *dataset, uint32_t thread_count, uin
     if (l == NULL) return mospt_err_nomem(err, sizeof *l);
     l->dataset = dataset, l->waiting_limit = waiting_bytes, l->wake = wake, l->user = user;
     l->last = &l->first;
+    l->paint = (rend_paint){.source = REND_PAINT_STORED, .attribute = -1}, l->paint_number = 1;
     pthread_mutex_init(&l->lock, NULL);
     pthread_cond_init(&l->work, NULL);
     pthread_cond_init(&l->done, NULL);
@@ -176,6 +213,24 @@ bool rend_loader_request(rend_loader *loader, const uint32_t *nodes, uint32_t co
     return ok;
 }
 
+void rend_loader_set_paint(rend_loader *loader, const rend_paint *paint)
+{
+    pthread_mutex_lock(&loader->lock);
+    loader->paint = *paint;
+    loader->paint_number++;
+    loader->wanted_count = loader->next_wanted = 0;
+    while (loader->first != NULL) {
+        finished *f = loader->first;
+        loader->first = f->next;
+        loader->busy[f->loaded.node] = 0;
+        discard(loader, f);
+    }
+    loader->last = &loader->first;
+    loader->finished_count = 0;
+    pthread_cond_broadcast(&loader->work);
+    pthread_mutex_unlock(&loader->lock);
+}
+
 uint32_t rend_loader_take(rend_loader *loader, rend_loaded *out, uint32_t max)
 {
     uint32_t count = 0;
@@ -186,7 +241,7 @@ uint32_t rend_loader_take(rend_loader *loader, rend_loaded *out, uint32_t max)
         if (loader->first == NULL) loader->last = &loader->first;
         loader->finished_count--;
         loader->waiting_bytes -= f->size;
-        loader->busy[f->loaded.node] = false;
+        loader->busy[f->loaded.node] = 0;
         out[count++] = f->loaded;
         free(f);
     }

@@ -1,11 +1,12 @@
-/* render/loader.h - threads that read vertices, so that the render thread never waits for a disk.
+/* render/loader.h - threads that read vertices and paint them, so that the render thread never
+ * waits for a disk.
  *
  * Wimmer & Scheiblauer 2006, section 5.3: out-of-core requests are handled in a separate thread.
  * Each frame hands over all that it misses, most urgent first, and so withdraws what the frame
  * before wanted and nobody has begun to read. What has been read waits until the render thread
  * takes it; when that is more than a limit, reading waits too. */
 #pragma once
-#include "mospt/dataset.h"
+#include "render/paint.h"
 
 typedef struct rend_loader rend_loader;
 
@@ -37,6 +38,12 @@ void rend_loader_destroy(rend_loader *loader);
 bool rend_loader_request(rend_loader *loader, const uint32_t *nodes, uint32_t count,
                          mospt_err *err);
 
+/* From now on nodes are painted so; before the first call they stay as they are stored. Drops what
+ * has been read and not been taken, and what is being read: nothing painted otherwise arrives any
+ * more. What was asked for is forgotten.
+ * paint    copied */
+void rend_loader_set_paint(rend_loader *loader, const rend_paint *paint);
+
 /* Takes what has been read, in the order in which it was finished; returns how many.
  * out      [max] */
 uint32_t rend_loader_take(rend_loader *loader, rend_loaded *out, uint32_t max);
@@ -47,5 +54,5 @@ bool rend_loader_wait(rend_loader *loader);
 /* Nodes asked for, being read, or waiting to be taken. */
 uint32_t rend_loader_pending(rend_loader *loader);
 
-/* Bytes of vertices read since the start. */
+/* Bytes of vertices and attributes read since the start. */
 uint64_t rend_loader_bytes(rend_loader *loader);

@@ -86,7 +86,7 @@ static void from_oklab(double lightness, double a, double b, uint8_t rgb[3])
  * one. */
 void rend_ramp_hue(uint32_t index, uint8_t rgb[3])
 {
-    static const double lightness[3] = {0.74, 0.64, 0.84};
+    static const double lightness[3] = {0.72, 0.80, 0.62};
     double turns = 0.69 + index * 0.61803398874989485, chroma = 0.145;
     double angle = 6.283185307179586 * (turns - floor(turns));
     from_oklab(lightness[index % 3], chroma * cos(angle), chroma * sin(angle), rgb);

@@ -14,37 +14,25 @@
 enum { CLASSES_MAX = 16 };
 
 static const struct {
-    const char *name;
     rend_paint_source source;
-    const char *attributes[5]; /* the first that there is, is shown */
     bool classes;
     const char *title;
 } modes[REND_COLOUR_COUNT] = {
-    [REND_COLOUR_RGB] = {"rgb", REND_PAINT_STORED, {"rgb"}, true, ""},
-    [REND_COLOUR_INTENSITY] =
-        {"intensity", REND_PAINT_INTENSITY, {"intensity"}, false, "Intensity"},
-    [REND_COLOUR_ELEVATION] = {"elevation", REND_PAINT_HEIGHT, {NULL}, false, "Elevation, m"},
-    [REND_COLOUR_CLASSIFICATION] =
-        {"classification", REND_PAINT_VALUE, {"classification"}, true, "Classification"},
-    [REND_COLOUR_RETURN] = {"return", REND_PAINT_VALUE, {"return_number"}, true, "Return"},
-    [REND_COLOUR_TIME] =
-        {"time", REND_PAINT_VALUE, {"gps_time", "time", "timestamp", "t"}, false, "Time"},
-    [REND_COLOUR_SCAN] = {"scan", REND_PAINT_VALUE, {"scan"}, true, "Scans"},
-    [REND_COLOUR_DENSITY] =
-        {"density", REND_PAINT_LEVEL, {NULL}, false, "Density: spacing of points, about"},
-    [REND_COLOUR_DISTANCE] =
-        {"distance", REND_PAINT_DISTANCE, {NULL}, false, "Distance to the scanner, m"},
+    [REND_COLOUR_RGB] = {REND_PAINT_STORED, true, ""},
+    [REND_COLOUR_INTENSITY] = {REND_PAINT_INTENSITY, false, "Intensity"},
+    [REND_COLOUR_ELEVATION] = {REND_PAINT_HEIGHT, false, "Elevation, m"},
+    [REND_COLOUR_CLASSIFICATION] = {REND_PAINT_VALUE, true, "Classification"},
+    [REND_COLOUR_RETURN] = {REND_PAINT_VALUE, true, "Return"},
+    [REND_COLOUR_TIME] = {REND_PAINT_VALUE, false, "Time"},
+    [REND_COLOUR_SCAN] = {REND_PAINT_VALUE, true, "Scans"},
+    [REND_COLOUR_DENSITY] = {REND_PAINT_LEVEL, false, "Density: spacing of points, about"},
+    [REND_COLOUR_DISTANCE] = {REND_PAINT_DISTANCE, false, "Distance to the scanner, m"},
 };
 
 struct rend_scheme {
     const mospt_dataset *dataset;
     rend_sample *sample; /* owned; NULL: not read yet */
 };
-
-const char *rend_scheme_name(rend_colour colour)
-{
-    return modes[colour].name;
-}
 
 rend_scheme *rend_scheme_create(const mospt_dataset *dataset)
 {
@@ -60,99 +48,31 @@ void rend_scheme_destroy(rend_scheme *scheme)
     free(scheme);
 }
 
-static bool same_text(const char *a, const char *b)
-{
-    return a == b || (a != NULL && b != NULL && strcmp(a, b) == 0);
-}
-
 bool rend_scheme_same(const rend_look *a, const rend_look *b)
 {
     bool same_range = a->has_range == b->has_range &&
                       (!a->has_range || memcmp(a->range, b->range, sizeof a->range) == 0);
-    return a->colour == b->colour && same_text(a->attribute, b->attribute) && same_range &&
-           a->map == b->map && a->brightness == b->brightness && a->gamma == b->gamma;
+    bool same_attribute = a->colour != REND_COLOUR_ATTRIBUTE || b->colour != a->colour ||
+                          strcmp(a->attribute, b->attribute) == 0;
+    return a->colour == b->colour && same_attribute && same_range && a->map == b->map &&
+           a->brightness == b->brightness && a->gamma == b->gamma;
 }
 
-/* ---- what there is ---- */
-
-/* Index of the attribute that a mode shows, -1 if it is not there. */
-static int find_of_mode(const mospt_schema *schema, rend_colour colour)
-{
-    for (const char *const *name = modes[colour].attributes; *name != NULL; name++) {
-        int at = mospt_schema_find(schema, *name);
-        if (at >= 0) return at;
-    }
-    return -1;
-}
-
-static bool has_pose(const mospt_metadata *m)
-{
-    for (uint32_t s = 0; s < m->source_count; s++)
-        if (m->sources[s].has_pose) return true;
-    return false;
-}
-
-static bool has_intensity(const mospt_metadata *m)
-{
-    for (uint32_t s = 0; s < m->source_count; s++)
-        if (m->sources[s].has_intensity) return true;
-    return mospt_schema_find(&m->schema, "intensity") >= 0;
-}
-
-static bool offers(const mospt_metadata *m, rend_colour colour)
-{
-    bool needs_scan = m->source_count > 1;
-    switch (colour) {
-    case REND_COLOUR_RGB:
-    case REND_COLOUR_ELEVATION:
-    case REND_COLOUR_DENSITY:
-        return true;
-    case REND_COLOUR_INTENSITY:
-        return has_intensity(m);
-    case REND_COLOUR_DISTANCE:
-        return has_pose(m) && (!needs_scan || mospt_schema_find(&m->schema, "scan") >= 0);
-    default:
-        return find_of_mode(&m->schema, colour) >= 0;
-    }
-}
-
-static bool is_shown_by_mode(const mospt_schema *schema, int attribute)
-{
-    for (int c = 0; c < REND_COLOUR_ATTRIBUTE; c++)
-        if (find_of_mode(schema, (rend_colour)c) == attribute) return true;
-    return false;
-}
-
-uint32_t rend_scheme_choices(const mospt_dataset *dataset, rend_choice *out)
-{
-    const mospt_metadata *m = &dataset->metadata;
-    uint32_t count = 0;
-    for (int c = 0; c < REND_COLOUR_ATTRIBUTE; c++)
-        if (offers(m, (rend_colour)c)) out[count++] = (rend_choice){.colour = (rend_colour)c};
-    for (uint32_t a = 0; a < m->schema.count; a++) {
-        if (is_shown_by_mode(&m->schema, (int)a)) continue;
-        out[count].colour = REND_COLOUR_ATTRIBUTE;
-        memcpy(out[count++].attribute, m->schema.at[a].name, sizeof out->attribute);
-    }
-    return count;
-}
+/* ---- what to show ---- */
 
 static bool not_offered(const mospt_dataset *dataset, const char *what, mospt_err *err)
 {
     rend_choice choices[REND_CHOICES_MAX];
     char list[400] = "";
-    uint32_t count = rend_scheme_choices(dataset, choices);
+    uint32_t count = rend_choice_list(&dataset->metadata, choices);
     for (uint32_t i = 0; i < count; i++) {
-        const char *name = modes[choices[i].colour].name;
         size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "",
-                 name != NULL ? name : choices[i].attribute);
+                 rend_choice_text(&choices[i]));
     }
     return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                          "the points have no %.60s; colours can show %s", what, list);
 }
-
-/* ---- what to show ---- */
 
 /* "NAME" or "NAME:2". */
 static bool find_attribute(const mospt_dataset *dataset, const char *text, rend_paint *paint,
@@ -181,13 +101,13 @@ static bool find_attribute(const mospt_dataset *dataset, const char *text, rend_
     return true;
 }
 
-static bool find_distance(const mospt_dataset *dataset, mospt_err *err)
+/* Why a colouring with a name is not offered. */
+static bool name_lack(const mospt_dataset *dataset, rend_colour colour, mospt_err *err)
 {
-    if (!has_pose(&dataset->metadata))
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                             "no scan says where its scanner stood, so there is no distance to it; "
-                             "`build --poses` can say it");
-    return not_offered(dataset, "scan", err);
+    if (colour != REND_COLOUR_DISTANCE) return not_offered(dataset, rend_choice_name(colour), err);
+    return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                         "no scan says where its scanner stood, so there is no distance to it; a "
+                         "build with --poses can say it");
 }
 
 /* Ranges and maps belong to values. */
@@ -196,7 +116,7 @@ static bool fits_colours(const rend_look *look, const rend_paint *p, mospt_err *
     bool own = look->colour == REND_COLOUR_ATTRIBUTE ? p->source == REND_PAINT_DIRECTION
                                                      : modes[look->colour].classes;
     const char *name =
-        look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : modes[look->colour].name;
+        look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : rend_choice_name(look->colour);
     if (own && look->map != REND_MAP_USUAL)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "%s has colours of its own, a colour map is for values", name);
@@ -213,15 +133,14 @@ static bool resolve(const mospt_dataset *dataset, const rend_look *look, rend_pa
     rend_paint p = {.dataset = dataset, .attribute = -1};
     if (look->colour == REND_COLOUR_ATTRIBUTE) {
         if (!find_attribute(dataset, look->attribute, &p, err)) return false;
-    } else if (!offers(m, look->colour)) {
-        return look->colour == REND_COLOUR_DISTANCE
-                   ? find_distance(dataset, err)
-                   : not_offered(dataset, modes[look->colour].name, err);
+    } else if (!rend_choice_is_offered(m, look->colour)) {
+        return name_lack(dataset, look->colour, err);
     } else {
         p.source = modes[look->colour].source;
         p.classes = modes[look->colour].classes;
         p.zero_is_none = look->colour == REND_COLOUR_TIME;
-        if (p.source == REND_PAINT_VALUE) p.attribute = find_of_mode(&m->schema, look->colour);
+        if (p.source == REND_PAINT_VALUE)
+            p.attribute = rend_choice_attribute(&m->schema, look->colour);
         if (p.source == REND_PAINT_DISTANCE && m->source_count > 1)
             p.attribute = mospt_schema_find(&m->schema, "scan");
     }
@@ -388,7 +307,7 @@ static void make_classes(const rend_look *look, const rend_values *values, rend_
 {
     for (uint32_t i = 0; i < REND_RAMP_STEPS; i++) {
         if (look->colour == REND_COLOUR_CLASSIFICATION) rend_asprs_colour(i, p->ramp.rgb[i]);
-        else rend_ramp_hue(i, p->ramp.rgb[i]);
+        else rend_ramp_hue(look->colour == REND_COLOUR_RETURN ? i - 1 : i, p->ramp.rgb[i]);
     }
     p->classes = true;
     if (look->colour == REND_COLOUR_SCAN) {

@@ -5,24 +5,9 @@
  * the caches. The sample is read once, when a range is first needed.
  * threads  one */
 #pragma once
+#include "render/choice.h"
 #include "render/legend.h"
 #include "render/paint.h"
-
-/* One way of colouring that a dataset offers. */
-typedef struct {
-    rend_colour colour;
-    char attribute[MOSPT_ATTRIBUTE_NAME_MAX]; /* of REND_COLOUR_ATTRIBUTE */
-} rend_choice;
-
-enum { REND_CHOICES_MAX = REND_COLOUR_COUNT + MOSPT_ATTRIBUTES_MAX };
-
-/* "rgb" ..., as on the command line; NULL for REND_COLOUR_ATTRIBUTE. */
-const char *rend_scheme_name(rend_colour colour);
-
-/* All that the dataset has something to show for: the named ones first, then every attribute that
- * none of them shows.
- * out      [REND_CHOICES_MAX]; returns how many */
-uint32_t rend_scheme_choices(const mospt_dataset *dataset, rend_choice *out);
 
 /* True if `look` can be shown; reads nothing.
  * errors   MOSPT_EINVAL: a sentence that names what there is instead */

@@ -22,7 +22,9 @@ static bool draw(const mospt_dataset *dataset, rgl *gl, const rend_shot_options 
     double start = now_ms();
     bool ok = rend_stage_create(dataset, gl, &options->limits, NULL, NULL, &stage, err) &&
               rend_stage_still(stage, view, err) &&
-              rgl_read_pixels(gl, false, view->width, view->height, rgb, err);
+              rgl_read_pixels(gl, false, view->width, view->height, rgb, err) &&
+              (!options->legend ||
+               rend_legend_draw(rend_stage_legend(stage), view->width, view->height, rgb, err));
     if (ok) {
         rend_stage_figures(stage, &figures);
         *result = (rend_shot_result){

@@ -11,6 +11,7 @@ typedef struct {
     uint32_t width, height; /* pixels; 0: 1280 x 720 */
     rend_camera_options camera;
     rend_look look;
+    bool legend;        /* what the colours mean, in the picture */
     rend_limits limits; /* budget_points 0: all */
 } rend_shot_options;
 

@@ -6,6 +6,7 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum {
     PAGE_POINTS =
@@ -33,6 +34,14 @@ struct rend_stage {
     rend_pages *pages;
     uint32_t page_count;
     uint8_t *residency; /* [node count] on the GPU, owned */
+
+    rend_scheme *scheme;
+    rend_look painted;     /* whose colours the loader and the RAM cache have */
+    char *attribute;       /* owned: the look's, whose owner may be gone */
+    uint32_t paint_number; /* from 1; 0: nothing was painted yet */
+    uint32_t *gpu_paint;   /* [node count], owned: number of the paint of what is on the GPU */
+    rend_legend legend;
+
     uint32_t bounds_low[3], bounds_high[3], z_low, z_high;
 
     const rend_selection *selection;
@@ -109,12 +118,14 @@ static bool make_caches(rend_stage *s, const rend_limits *limits, rend_loader_wa
     uint64_t gpu = (uint64_t)s->page_count * PAGE_POINTS * sizeof(mospt_vertex);
     s->residency = calloc((size_t)nodes + 1, 1);
     s->wanted = calloc((size_t)nodes + 1, sizeof *s->wanted);
+    s->gpu_paint = calloc((size_t)nodes + 1, sizeof *s->gpu_paint);
+    s->scheme = rend_scheme_create(s->dataset);
     s->selector = rend_select_create();
     s->pages = rend_pages_create(s->page_count);
     s->ram = rend_cache_create(nodes, ram, evict_vertices, s);
     s->gpu = rend_cache_create(nodes, gpu, evict_place, s);
-    if (s->residency == NULL || s->wanted == NULL || s->selector == NULL || s->pages == NULL ||
-        s->ram == NULL || s->gpu == NULL)
+    if (s->residency == NULL || s->wanted == NULL || s->gpu_paint == NULL || s->scheme == NULL ||
+        s->selector == NULL || s->pages == NULL || s->ram == NULL || s->gpu == NULL)
         return mospt_err_nomem(err, (size_t)nodes * 64);
     if (!rgl_arena_create(s->gl, (uint64_t)s->page_count * PAGE_POINTS, err)) return false;
     uint64_t waiting = ram < WAITING_BYTES_MAX ? ram : WAITING_BYTES_MAX;
@@ -145,6 +156,9 @@ void rend_stage_destroy(rend_stage *stage)
     rend_cache_destroy(stage->gpu);
     rend_pages_destroy(stage->pages);
     rend_select_destroy(stage->selector);
+    rend_scheme_destroy(stage->scheme);
+    free(stage->attribute);
+    free(stage->gpu_paint);
     free(stage->residency);
     free(stage->wanted);
     free(stage->pinned);
@@ -189,6 +203,7 @@ static bool upload(rend_stage *s, uint32_t node, const mospt_vertex *vertices, b
     assert(put);
     (void)put;
     s->residency[node] = REND_RESIDENT;
+    s->gpu_paint[node] = s->paint_number;
     return true;
 }
 
@@ -244,6 +259,41 @@ static bool put_on_gpu(rend_stage *s, uint32_t node, const mospt_vertex *vertice
         return false;
     }
     return pin(s, node, err);
+}
+
+/* ---- colours ---- */
+
+static bool is_stale(const rend_stage *s, uint32_t node)
+{
+    return s->residency[node] == REND_RESIDENT && s->gpu_paint[node] != s->paint_number;
+}
+
+/* What was damaged to the old paint, which may have read more, may be fine to the new one. */
+static void forget_damage(rend_stage *s)
+{
+    for (uint32_t n = 0; n < s->dataset->hierarchy.count; n++)
+        if (s->residency[n] == REND_DAMAGED) s->residency[n] = REND_ABSENT;
+    s->figures.damaged_nodes = 0, s->figures.damaged_points = 0;
+    s->figures.damage = (mospt_err){0};
+}
+
+/* What is on the GPU stays there, to be drawn until it has been replaced. */
+static bool use_colours(rend_stage *s, const rend_look *look, mospt_err *err)
+{
+    rend_paint paint;
+    if (s->paint_number > 0 && rend_scheme_same(look, &s->painted)) return true;
+    char *attribute = look->attribute != NULL ? strdup(look->attribute) : NULL;
+    if (look->attribute != NULL && attribute == NULL)
+        return mospt_err_nomem(err, strlen(look->attribute));
+    if (!rend_scheme_make(s->scheme, look, &paint, &s->legend, err)) return free(attribute), false;
+    free(s->attribute);
+    s->painted = *look;
+    s->painted.attribute = s->attribute = attribute;
+    s->paint_number++;
+    rend_loader_set_paint(s->loader, &paint);
+    rend_cache_clear(s->ram);
+    forget_damage(s);
+    return true;
 }
 
 /* ---- what to draw in which order ---- */
@@ -359,7 +409,7 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
     const rend_look *look = &view->look;
     rgl_scene scene = {
         .frame = s->frame,
-        .colour = look->colour,
+        .colour = REND_COLOUR_RGB, /* points come painted */
         .z_low = s->z_low,
         .z_high = s->z_high,
         .octants = look->size_mode == REND_SIZE_AUTO ? s->selection->octants : NULL,
@@ -415,12 +465,36 @@ static void take_loaded(rend_stage *s)
             store(s, &loaded[i]);
 }
 
+/* Does the same for what is drawn in the colours of before: it keeps its place. */
+static bool fetch_stale(rend_stage *s, uint32_t *wanted, uint64_t *bytes, rend_progress *progress,
+                        mospt_err *err)
+{
+    for (uint32_t i = 0; i < s->selection->draw_count; i++) {
+        uint32_t node = s->selection->draws[i].node;
+        if (!is_stale(s, node)) continue;
+        s->figures.pending++;
+        const mospt_vertex *vertices = rend_cache_use(s->ram, node);
+        if (vertices == NULL) {
+            s->wanted[(*wanted)++] = node;
+            continue;
+        }
+        *progress = REND_AGAIN;
+        if (*bytes >= UPLOAD_BYTES_PER_FRAME) break;
+        if (!upload_runs(s, node, rend_cache_use(s->gpu, node), vertices, err)) return false;
+        s->gpu_paint[node] = s->paint_number;
+        *bytes += mospt_dataset_vertices_size(s->dataset, node);
+    }
+    return true;
+}
+
 /* Uploads what the RAM cache has, and asks the loader for the rest. */
 static bool fetch(rend_stage *s, rend_progress *progress, mospt_err *err)
 {
     uint64_t bytes = 0;
     uint32_t wanted = 0;
     *progress = REND_SETTLED;
+    s->figures.pending = s->selection->request_count;
+    if (!fetch_stale(s, &wanted, &bytes, progress, err)) return false;
     for (uint32_t i = 0; i < s->selection->request_count; i++) {
         uint32_t node = s->selection->requests[i].node;
         const mospt_vertex *vertices = rend_cache_use(s->ram, node);
@@ -436,13 +510,13 @@ static bool fetch(rend_stage *s, rend_progress *progress, mospt_err *err)
         bytes += mospt_dataset_vertices_size(s->dataset, node);
     }
     if (*progress == REND_SETTLED && wanted > 0) *progress = REND_WAITING;
-    s->figures.pending = s->selection->request_count;
     return rend_loader_request(s->loader, s->wanted, wanted, err);
 }
 
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
                       mospt_err *err)
 {
+    if (!use_colours(stage, &view->look, err)) return false;
     take_loaded(stage);
     if (!select_view(stage, view, false, err)) return false;
     unpin_all(stage);
@@ -508,6 +582,7 @@ static bool bring(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
     unpin_all(s);
     for (uint32_t i = from; i < to; i++) {
         uint32_t node = draw_at(s, i)->node;
+        if (is_stale(s, node)) rend_cache_drop(s->gpu, node);
         if (s->residency[node] == REND_RESIDENT && !pin(s, node, err)) return false;
     }
     for (uint32_t i = from; i < to; i++) {
@@ -522,7 +597,7 @@ static bool bring(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
 
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
-    if (!select_view(stage, view, true, err)) return false;
+    if (!use_colours(stage, &view->look, err) || !select_view(stage, view, true, err)) return false;
     rgl_scene scene = make_scene(stage, view);
     uint32_t total = stage->selection->draw_count, from = 0;
     int parts = RGL_BEGIN | view->parts;
@@ -547,6 +622,11 @@ void rend_stage_figures(rend_stage *stage, rend_figures *out)
     f->gpu_used = rend_cache_used(stage->gpu), f->gpu_limit = rend_cache_limit(stage->gpu);
     f->loaded_bytes = rend_loader_bytes(stage->loader);
     *out = *f;
+}
+
+const rend_legend *rend_stage_legend(const rend_stage *stage)
+{
+    return &stage->legend;
 }
 
 const rend_frame *rend_stage_last_frame(const rend_stage *stage)

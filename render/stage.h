@@ -3,7 +3,8 @@
  * Owns the caches, the loader and the selection of one dataset on one GL context. In a window a
  * frame takes what is resident and asks for the rest (rend_stage_frame); a picture waits for all of
  * it and is the same, byte for byte, however small the caches are (rend_stage_still). Neither knows
- * a clock.
+ * a clock. When a look asks for other colours, nodes are fetched again to be painted anew; until
+ * they arrive, a window shows them as they were.
  * threads  the one that has the context */
 #pragma once
 #include "mospt/dataset.h"
@@ -11,6 +12,7 @@
 #include "render/gl/rgl.h"
 #include "render/loader.h"
 #include "render/options.h"
+#include "render/scheme.h"
 #include "render/select.h"
 
 typedef struct rend_stage rend_stage;
@@ -52,6 +54,8 @@ typedef enum {
     REND_AGAIN,   /* the next frame shows more */
 } rend_progress;
 
+/* Both fail with MOSPT_EINVAL for colours that the dataset cannot show, see rend_scheme_fits(). */
+
 /* Draws what is resident and asks for what is not. Uploads at most a fixed number of bytes; never
  * waits. */
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
@@ -61,6 +65,9 @@ bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err);
 
 void rend_stage_figures(rend_stage *stage, rend_figures *out);
+
+/* What the colours that were drawn last mean. */
+const rend_legend *rend_stage_legend(const rend_stage *stage);
 
 /* The frame that was drawn last: to find out what is under the cursor. */
 const rend_frame *rend_stage_last_frame(const rend_stage *stage);

@@ -35,7 +35,9 @@ typedef struct {
     rend_stage *stage;
     rend_view_of view;
     rend_camera home;
-    bool help, quit, dirty;
+    rend_choice choices[REND_CHOICES_MAX]; /* what colours can show */
+    uint32_t choice_count;
+    bool help, no_legend, quit, dirty;
 
     /* A drag in hand. */
     enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN } drag;
@@ -170,16 +172,44 @@ static void save_picture(viewer *v)
     tell(v, text);
 }
 
+/* Other colours, if the dataset has them; else a sentence that says why not. */
+static void show_colours(viewer *v, const rend_look *look)
+{
+    mospt_err err = {0};
+    if (rend_scheme_fits(v->dataset, look, &err)) v->view.look = *look;
+    else tell(v, err.message);
+}
+
+/* Keys that change what colours show. */
+static void press_colour_key(viewer *v, int key, bool shift)
+{
+    rend_look look = v->view.look;
+    double brightness = look.brightness > 0 ? look.brightness : 1;
+    if (key == 'C') {
+        rend_choice_step(v->choices, v->choice_count, shift ? -1 : 1, &look);
+    } else if (key >= '1' && key <= '9') {
+        rend_choice_read(rend_choice_name((rend_colour)(key - '1')), &look);
+        look.has_range = false, look.map = REND_MAP_USUAL;
+    } else if (key == 'M') {
+        look.map = (rend_map)((look.map + 1) % REND_MAP_COUNT);
+    } else if (key == ',' || key == '.') {
+        look.brightness = brightness * (key == '.' ? 1.25 : 0.8);
+    } else {
+        return;
+    }
+    show_colours(v, &look);
+}
+
 /* Keys that change how points look. */
-static void press_look_key(viewer *v, int key)
+static void press_look_key(viewer *v, int key, bool shift)
 {
     rend_look *look = &v->view.look;
     if (key == '+') scale_points(v, 1);
     else if (key == '-') scale_points(v, -1);
     else if (key == '0') look->size_mode = REND_SIZE_AUTO;
-    else if (key == 'C') look->colour = (rend_colour)((look->colour + 1) % REND_COLOUR_COUNT);
-    else if (key >= '1' && key <= '3') look->colour = (rend_colour)(key - '1');
     else if (key == 'L') look->no_edl = !look->no_edl;
+    else if (key == 'K') v->no_legend = !v->no_legend;
+    else press_colour_key(v, key, shift);
 }
 
 static void press_key(viewer *v, const rgl_event *e)
@@ -193,7 +223,7 @@ static void press_key(viewer *v, const rgl_event *e)
     else if (e->key == '[') scale_budget(v, 0.8);
     else if (e->key == 'P') save_picture(v);
     else if (e->key == 'F') rgl_window_toggle_fullscreen(v->window);
-    else press_look_key(v, e->key);
+    else press_look_key(v, e->key, e->shift);
 }
 
 static void handle(viewer *v, const rgl_event *e)
@@ -267,17 +297,19 @@ static void fit_text(viewer *v)
 
 static bool draw_words(viewer *v, mospt_err *err)
 {
-    static const char *const colours[] = {"RGB", "intensity", "elevation"};
     char look[64];
     const rend_look *l = &v->view.look;
     rend_hud hud = {.frame_ms = v->frame_ms,
                     .budget_points = v->view.budget_points,
                     .notice = v->notice,
                     .help = v->help};
+    const char *colours =
+        l->colour == REND_COLOUR_ATTRIBUTE ? l->attribute : rend_choice_name(l->colour);
     if (v->text == NULL) return true;
+    if (!v->no_legend) hud.legend = rend_stage_legend(v->stage);
     if (l->size_mode == REND_SIZE_FIXED)
-        snprintf(look, sizeof look, "%s  %g px", colours[l->colour], (double)fmaxf(l->point_px, 1));
-    else snprintf(look, sizeof look, "%s", colours[l->colour]);
+        snprintf(look, sizeof look, "%s  %g px", colours, (double)fmaxf(l->point_px, 1));
+    else snprintf(look, sizeof look, "%s", colours);
     hud.look = look;
     rend_stage_figures(v->stage, &hud.figures);
     return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err);
@@ -401,6 +433,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
     v->view.parts = RGL_TO_WINDOW;
     v->view.width = o->width > 0 ? o->width : REND_WIDTH_DEFAULT;
     v->view.height = o->height > 0 ? o->height : REND_HEIGHT_DEFAULT;
+    v->choice_count = rend_choice_list(&v->dataset->metadata, v->choices);
     v->help = o->help;
     v->dirty = true;
     if (!rend_camera_make(&o->camera, v->dataset, v->view.width, v->view.height, &v->home, err))
