@@ -114,3 +114,9 @@ void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend
     look->has_range = false;
     look->map = REND_MAP_USUAL;
 }
+
+rend_map rend_choice_map(const rend_look *look)
+{
+    if (look->map != REND_MAP_USUAL) return look->map;
+    return look->colour == REND_COLOUR_INTENSITY ? REND_MAP_GREY : REND_MAP_VIRIDIS;
+}

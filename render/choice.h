@@ -33,3 +33,6 @@ const char *rend_choice_text(const rend_choice *choice);
 /* Changes a look to the next one of a list (step 1) or the one before (step -1), with its usual
  * range and map. */
 void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend_look *look);
+
+/* The colour map that a look uses for values: its own, or the usual one. */
+rend_map rend_choice_map(const rend_look *look);

@@ -13,8 +13,8 @@ static const char *const HELP[] = {
     "B  shift B  ] [    more, fewer points (budget)",
     "+ -                larger, smaller points;  0  automatic",
     "C  shift C         next, previous colours: all that the points carry",
-    "1 2 3 4 5          RGB, intensity, elevation, classification, return",
-    "6 7 8 9            time, scan, density, distance to the scanner",
+    "1 to 9             RGB, intensity, elevation, classification, return, time, scan,",
+    "                   density, distance to the scanner",
     "M  K               next colour map;  legend on and off",
     ", .                darker, brighter RGB",
     "L                  eye-dome lighting",
@@ -96,13 +96,13 @@ static void help_box(labels *l, const rgl_text *text, uint32_t width, uint32_t h
     size_t longest = 0;
     for (int i = 0; i < HELP_COUNT; i++)
         if (strlen(HELP[i]) > longest) longest = strlen(HELP[i]);
-    float w = (float)longest * advance + 2 * pad, h = HELP_COUNT * line * 1.25f + 2 * pad;
+    float w = (float)longest * advance + 2 * pad, h = HELP_COUNT * line * 1.1f + 2 * pad;
     float x = ((float)width - w) / 2, y = ((float)height - h) / 2;
     if (x < 0) x = 0;
     if (y < 0) y = 0;
     panel(l, x, y, w, h);
     for (int i = 0; i < HELP_COUNT; i++)
-        words(l, x + pad, y + pad + (float)i * line * 1.25f, WHITE, HELP[i]);
+        words(l, x + pad, y + pad + (float)i * line * 1.1f, WHITE, HELP[i]);
 }
 
 bool rend_hud_draw(rgl_text *text, const rend_hud *hud, uint32_t width, uint32_t height,

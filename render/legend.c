@@ -82,8 +82,8 @@ uint32_t rend_legend_labels(const rend_legend *legend, const rgl_metrics *metric
     labels l = {.at = out};
     if (legend->title[0] == '\0') return 0;
     float line = metrics->line, advance = metrics->advance, pad = line / 2;
-    /* As many rows as the picture has room for. */
-    float room = ((float)height - top - 2 * pad) / line - 4;
+    /* As many rows as the picture has room for, beside title and notes. */
+    float room = ((float)height - top - 4 * pad) / line - 4.5f;
     uint32_t rows = room < (float)legend->row_count ? (uint32_t)fmaxf(room, 0) : legend->row_count;
     bool some_left = legend->rows_left_out > 0 || rows < legend->row_count;
     float bar = legend->has_bar ? fmaxf(fminf(10 * line, room * line), 2 * line) : 0;

@@ -199,12 +199,6 @@ static void name_ticks(const rend_paint *p, double from, double unit, rend_legen
             tick_text((p->low + t * step - from) / unit, step / unit, l->ticks[t]);
 }
 
-static rend_map usual_map(const rend_look *look)
-{
-    if (look->map != REND_MAP_USUAL) return look->map;
-    return look->colour == REND_COLOUR_INTENSITY ? REND_MAP_GREY : REND_MAP_VIRIDIS;
-}
-
 /* Time counts from the start of what is shown, in the unit that suits its length. */
 static void name_time(const rend_paint *p, rend_legend *l)
 {
@@ -229,7 +223,7 @@ static void make_bar(const rend_look *look, const rend_values *values, rend_pain
         if (!(values->at[tail] < values->at[values->count - 1 - tail])) tail = 0;
         p->low = values->at[tail], p->high = values->at[values->count - 1 - tail];
     }
-    rend_ramp_fill(usual_map(look), &p->ramp);
+    rend_ramp_fill(rend_choice_map(look), &p->ramp);
     l->has_bar = true;
     l->ramp = p->ramp;
     if (look->colour == REND_COLOUR_TIME) name_time(p, l);
@@ -243,7 +237,7 @@ static void make_bar(const rend_look *look, const rend_values *values, rend_pain
 static void make_stretched_intensity(const rend_look *look, rend_paint *p, rend_legend *l)
 {
     p->low = 0, p->high = REND_RAMP_STEPS - 1;
-    rend_ramp_fill(usual_map(look), &p->ramp);
+    rend_ramp_fill(rend_choice_map(look), &p->ramp);
     l->has_bar = true;
     l->ramp = p->ramp;
     snprintf(l->ticks[0], sizeof *l->ticks, "low");
@@ -275,7 +269,7 @@ static void make_density(const rend_look *look, const mospt_dataset *d, const re
     int low = values->count > 0 ? (int)values->at[tail] : 0;
     int high = values->count > 0 ? (int)values->at[values->count - 1 - tail] : 0;
     rend_ramp map;
-    rend_ramp_fill(usual_map(look), &map);
+    rend_ramp_fill(rend_choice_map(look), &map);
     for (int i = 0; i < REND_RAMP_STEPS; i++) {
         int level = i < low ? low : i > high ? high : i;
         int step =

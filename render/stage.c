@@ -212,6 +212,7 @@ static bool upload(rend_stage *s, uint32_t node, const mospt_vertex *vertices, b
 static void note_damage(rend_stage *s, const rend_loaded *loaded)
 {
     if (loaded->err.code == MOSPT_ENOMEM || s->residency[loaded->node] == REND_DAMAGED) return;
+    rend_cache_drop(s->gpu, loaded->node); /* it may be there in other colours */
     s->residency[loaded->node] = REND_DAMAGED;
     s->figures.damaged_points += s->dataset->hierarchy.nodes[loaded->node].count;
     if (s->figures.damaged_nodes++ == 0) s->figures.damage = loaded->err;

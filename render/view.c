@@ -191,7 +191,7 @@ static void press_colour_key(viewer *v, int key, bool shift)
         rend_choice_read(rend_choice_name((rend_colour)(key - '1')), &look);
         look.has_range = false, look.map = REND_MAP_USUAL;
     } else if (key == 'M') {
-        look.map = (rend_map)((look.map + 1) % REND_MAP_COUNT);
+        look.map = (rend_map)(rend_choice_map(&look) % (REND_MAP_COUNT - 1) + 1);
     } else if (key == ',' || key == '.') {
         look.brightness = brightness * (key == '.' ? 1.25 : 0.8);
     } else {

@@ -196,6 +196,34 @@ static void wrong_use_is_exit_code_2_and_one_sentence(void **state)
     assert_non_null(strstr(said, "usage:"));
 }
 
+/* Known before anything is drawn, so no graphics driver is needed to find out. */
+static void colours_that_are_not_there_are_wrong_use(void **state)
+{
+    static const char *const wrong[] = {
+        "shot a.las -q -o x.png --color time",
+        "shot a.las -q -o x.png --color reflectance",
+        "shot a.las -q -o x.png --color distance",
+        "shot a.las -q -o x.png --color scan --color-range 0,1",
+        "shot a.las -q -o x.png --color scan --color-map turbo",
+        "shot a.las -q -o x.png --color elevation --color-range 2,1",
+        "shot a.las -q -o x.png --color elevation --color-map rainbow",
+        "shot a.las -q -o x.png --brightness 0",
+        "shot a.las -q -o x.png --gamma x",
+        "view a.las -q --color time",
+    };
+    (void)state;
+    make_las("a.las", 10);
+    for (size_t k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        expect(wrong[k], WRONG_USE);
+        assert_string_equal(out, "");
+        assert_int_equal(lines_of(said), 1);
+        assert_false(is_there("x.png"));
+    }
+    expect("shot a.las -q -o x.png --color reflectance", WRONG_USE);
+    assert_non_null(strstr(said, "no reflectance; colours can show rgb, intensity, elevation, "
+                                 "classification, return, scan, density, number_of_returns"));
+}
+
 static void help_goes_to_standard_output(void **state)
 {
     static const char *const pages[] = {"help",         "--help",     "-h",          "help build",
@@ -616,6 +644,7 @@ int main(int argc, char **argv)
 {
     const struct CMUnitTest tests[] = {
         CASE(wrong_use_is_exit_code_2_and_one_sentence),
+        CASE(colours_that_are_not_there_are_wrong_use),
         CASE(help_goes_to_standard_output),
         CASE(a_site_is_built_told_and_checked),
         CASE(json_is_all_there_is_on_standard_output),

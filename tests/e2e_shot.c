@@ -1,3 +1,4 @@
+#include "render/choice.h"
 #include "render/shot.h"
 #include "tests/ref_picture.h"
 #include "tests/render_tools.h"
@@ -161,11 +162,15 @@ static void every_look_can_be_drawn(void **unused)
     (void)unused;
     render_site site;
     rend_shot_result result;
+    rend_choice choices[REND_CHOICES_MAX];
     render_site_make(CORE_CLUSTERED, 5000, NULL, &site);
-    for (int colour = 0; colour < REND_COLOUR_COUNT; colour++)
+    uint32_t count = rend_choice_list(&site.dataset->metadata, choices);
+    for (uint32_t c = 0; c < count; c++)
         for (int mode = REND_SIZE_AUTO; mode <= REND_SIZE_WORLD; mode++) {
-            rend_look look = {
-                .colour = (rend_colour)colour, .size_mode = (rend_size_mode)mode, .point_px = 5};
+            rend_look look = {.colour = choices[c].colour,
+                              .attribute = choices[c].attribute,
+                              .size_mode = (rend_size_mode)mode,
+                              .point_px = 5};
             look.point_m = 3 * (float)site.dataset->metadata.grid.step,
             look.no_edl = mode == REND_SIZE_FIXED;
             take(&site, "a.png", (rend_shot_options){.look = look, .width = 37, .height = 23},

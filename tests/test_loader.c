@@ -151,6 +151,57 @@ static void a_damaged_node_comes_with_its_error(void **unused)
     render_site_fini(&bad);
 }
 
+static void assert_painted(const rend_loaded *loaded, const rend_paint *paint)
+{
+    size_t size = mospt_dataset_vertices_size(site.dataset, loaded->node),
+           planes_size = site.dataset->hierarchy.nodes[loaded->node].count *
+                         site.dataset->metadata.schema.row_size;
+    mospt_vertex *expected = malloc(size + 1);
+    uint8_t *planes = malloc(planes_size + 1);
+    mospt_err err = {0};
+    CORE_NEED(mospt_dataset_read_vertices(site.dataset, loaded->node, expected, &err));
+    CORE_NEED(mospt_dataset_read_attributes(site.dataset, loaded->node, planes, &err));
+    rend_paint_apply(paint, loaded->node, planes, expected);
+    assert_memory_equal(loaded->vertices, expected, size);
+    free(planes);
+    free(expected);
+}
+
+/* Takes some of what comes, then changes the paint while the rest is on its way. */
+static void nothing_arrives_in_the_paint_of_before(void **unused)
+{
+    (void)unused;
+    rend_loader *l;
+    mospt_err err = {0};
+    uint64_t state = 3;
+    uint32_t *wanted = calloc(node_count(), sizeof *wanted);
+    for (uint32_t n = 0; n < node_count(); n++)
+        wanted[n] = n;
+    CORE_NEED(rend_loader_create(site.dataset, 3, 1 << 20, NULL, NULL, &l, &err));
+    for (int round = 0; round < 60; round++) {
+        rend_paint paint = {.source = REND_PAINT_VALUE,
+                            .dataset = site.dataset,
+                            .attribute = 1,
+                            .high = 1000 * (round + 1)};
+        if (round % 3 == 0) paint.source = REND_PAINT_HEIGHT, paint.attribute = -1;
+        rend_ramp_fill(REND_MAP_TURBO, &paint.ramp);
+        rend_loader_set_paint(l, &paint);
+        CORE_NEED(rend_loader_request(l, wanted, node_count(), &err));
+        uint32_t enough = round == 59 ? node_count() : core_below(&state, node_count()), taken = 0;
+        while (taken < enough && rend_loader_wait(l)) {
+            rend_loaded loaded;
+            assert_int_equal(rend_loader_take(l, &loaded, 1), 1);
+            assert_painted(&loaded, &paint);
+            free(loaded.vertices);
+            taken++;
+        }
+        assert_int_equal(taken, enough);
+    }
+    assert_int_equal(rend_loader_pending(l), 0);
+    rend_loader_destroy(l);
+    free(wanted);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -158,6 +209,7 @@ int main(void)
         cmocka_unit_test(a_new_list_withdraws_the_old_one),
         cmocka_unit_test(frames_may_ask_as_often_as_they_like),
         cmocka_unit_test(a_damaged_node_comes_with_its_error),
+        cmocka_unit_test(nothing_arrives_in_the_paint_of_before),
     };
     return cmocka_run_group_tests(tests, make_site, remove_site);
 }

@@ -193,6 +193,141 @@ static void one_point_is_a_picture(void **unused)
     render_site_fini(&site);
 }
 
+static uint64_t points_in_frame(scene *s)
+{
+    mospt_err err = {0};
+    rend_progress progress;
+    uint64_t before = rgl_null_record(s->gl).points_drawn;
+    CORE_NEED(rend_stage_frame(s->stage, &s->view, &progress, &err));
+    return rgl_null_record(s->gl).points_drawn - before;
+}
+
+static const rend_look LOOKS[] = {
+    {.colour = REND_COLOUR_RGB},
+    {.colour = REND_COLOUR_SCAN},
+    {.colour = REND_COLOUR_ELEVATION},
+    {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag"},
+    {.colour = REND_COLOUR_ELEVATION, .map = REND_MAP_TURBO},
+    {.colour = REND_COLOUR_RGB, .brightness = 2},
+};
+enum { LOOK_COUNT = sizeof LOOKS / sizeof *LOOKS };
+
+static void new_colours_replace_the_old_ones_without_a_gap(void **unused)
+{
+    (void)unused;
+    render_site site;
+    const rend_limits limits[] = {{0}, {.ram_cache_bytes = 1}};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    for (int l = 0; l < 2; l++) {
+        scene s;
+        rend_figures figures;
+        start(&site, &limits[l], &s);
+        converge(&s);
+        uint64_t all = points_in_frame(&s);
+        for (int i = 1; i <= LOOK_COUNT; i++) {
+            s.view.look = LOOKS[i % LOOK_COUNT];
+            assert_int_equal(points_in_frame(&s), all); /* in the old colours */
+            rend_stage_figures(s.stage, &figures);
+            assert_true(figures.pending > 0);
+            converge(&s);
+            assert_int_equal(points_in_frame(&s), all);
+            rend_stage_figures(s.stage, &figures);
+            assert_int_equal(figures.pending, 0);
+        }
+        stop(&s);
+    }
+    render_site_fini(&site);
+}
+
+static uint64_t picture_of(const render_site *site, const rend_look *look)
+{
+    scene s;
+    mospt_err err = {0};
+    const rend_limits limits = {0};
+    start(site, &limits, &s);
+    s.view.look = *look;
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    uint64_t hash = rgl_null_record(s.gl).picture_hash;
+    stop(&s);
+    return hash;
+}
+
+/* In frames and in stills, with all in the caches and with next to nothing. */
+static void repainted_points_are_those_of_a_fresh_start(void **unused)
+{
+    (void)unused;
+    render_site site;
+    mospt_err err = {0};
+    const rend_limits limits[] = {{0}, {.ram_cache_bytes = 1}, {1, 1, 1, 0}};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    for (int l = 0; l < 3; l++) {
+        scene s;
+        start(&site, &limits[l], &s);
+        for (int i = 0; i < 2 * LOOK_COUNT; i++) {
+            s.view.look = LOOKS[i % LOOK_COUNT];
+            uint64_t wanted = picture_of(&site, &s.view.look);
+            if (l < 2) { /* the last cache does not hold a frame */
+                converge(&s);
+                assert_true(rgl_null_record(s.gl).picture_hash == wanted);
+                s.view.look = LOOKS[(i + 1) % LOOK_COUNT];
+                wanted = picture_of(&site, &s.view.look);
+            }
+            CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+            assert_true(rgl_null_record(s.gl).picture_hash == wanted);
+        }
+        stop(&s);
+    }
+    render_site_fini(&site);
+}
+
+static void colours_that_cannot_be_shown_change_nothing(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    mospt_err err = {0};
+    const rend_limits limits = {0};
+    rend_progress progress;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    converge(&s);
+    uint64_t before = rgl_null_record(s.gl).picture_hash;
+    s.view.look.colour = REND_COLOUR_TIME;
+    CORE_FAILS(rend_stage_frame(s.stage, &s.view, &progress, &err), MOSPT_EINVAL);
+    CORE_FAILS(rend_stage_still(s.stage, &s.view, &err), MOSPT_EINVAL);
+    s.view.look.colour = REND_COLOUR_RGB;
+    converge(&s);
+    assert_true(rgl_null_record(s.gl).picture_hash == before);
+    stop(&s);
+    render_site_fini(&site);
+}
+
+/* Vertices can be shown without their attributes, but not painted by them. */
+static void damaged_attributes_are_damage_only_where_they_are_shown(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    rend_figures figures;
+    const rend_limits limits = {0};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    site.dataset->hierarchy.nodes[1].attributes_hash ^= 1;
+    start(&site, &limits, &s);
+    for (int i = 0; i < 6; i++) {
+        s.view.look.colour = i % 2 == 0 ? REND_COLOUR_RGB : REND_COLOUR_SCAN;
+        if (i == 1) { /* nothing of the node in the old colours */
+            stop(&s);
+            start(&site, &limits, &s);
+            s.view.look.colour = REND_COLOUR_SCAN;
+        }
+        converge(&s);
+        rend_stage_figures(s.stage, &figures);
+        assert_int_equal(figures.damaged_nodes, i % 2);
+    }
+    stop(&s);
+    render_site_fini(&site);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -202,6 +337,10 @@ int main(void)
         cmocka_unit_test(the_budget_holds_in_frames_and_stills),
         cmocka_unit_test(a_damaged_node_is_counted_once_and_left_out),
         cmocka_unit_test(one_point_is_a_picture),
+        cmocka_unit_test(new_colours_replace_the_old_ones_without_a_gap),
+        cmocka_unit_test(repainted_points_are_those_of_a_fresh_start),
+        cmocka_unit_test(colours_that_cannot_be_shown_change_nothing),
+        cmocka_unit_test(damaged_attributes_are_damage_only_where_they_are_shown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,14 +46,20 @@ static bool null_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *verti
     return true;
 }
 
-static void record_vertex(null_rgl *n, const rgl_batch *batch, const mospt_vertex *vertex)
+static uint64_t link_vertex(uint64_t before, const rgl_batch *batch, const mospt_vertex *vertex)
 {
     struct {
         uint64_t before;
         mospt_vertex vertex;
         uint64_t round;
-    } link = {n->record.sequence_hash, *vertex, batch->round};
-    n->record.sequence_hash = mospt_hash(&link, sizeof link);
+    } link = {before, *vertex, batch->round};
+    return mospt_hash(&link, sizeof link);
+}
+
+static void record_vertex(null_rgl *n, const rgl_batch *batch, const mospt_vertex *vertex)
+{
+    n->record.sequence_hash = link_vertex(n->record.sequence_hash, batch, vertex);
+    n->record.picture_hash = link_vertex(n->record.picture_hash, batch, vertex);
     n->record.points_drawn++;
 }
 
@@ -80,6 +86,7 @@ static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
     if (parts & RGL_BEGIN) {
         size_t size = 8 * sizeof *scene->octants * scene->octant_nodes;
         n->record.octants_hash = scene->octants != NULL ? mospt_hash(scene->octants, size) : 0;
+        n->record.picture_hash = 0;
         n->record.begins++;
     }
     n->record.ends += (parts & RGL_END) != 0;

@@ -76,6 +76,7 @@ bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *er
 typedef struct {
     uint64_t points_drawn, points_uploaded, ranges, batches, begins, ends;
     uint64_t sequence_hash; /* of all vertices drawn, in their order */
+    uint64_t picture_hash;  /* of those since the last RGL_BEGIN */
     uint64_t octants_hash;  /* of the last scene */
     uint64_t overruns;      /* uploads or ranges outside the arena */
 } rgl_record;
