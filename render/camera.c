@@ -231,21 +231,6 @@ static bool trim_axis(const mospt_dataset *dataset, int axis, double *low, doubl
     return true;
 }
 
-void rend_camera_heights(const mospt_dataset *dataset, uint32_t *low, uint32_t *high)
-{
-    uint32_t box_low[3], box_high[3];
-    double bins[BINS];
-    int first, last;
-    rend_frame_bounds(dataset, box_low, box_high);
-    *low = box_low[2], *high = box_high[2];
-    double from = *low, width = ((double)*high - from) / BINS;
-    double sum = fill_bins(dataset, 2, from, (double)*high, bins);
-    if (!(width > 1) || sum < 0.5 * (double)dataset->hierarchy.point_count) return;
-    trim_bins(bins, 0.01 * sum, &first, &last);
-    *low = (uint32_t)(from + width * first);
-    *high = (uint32_t)fmin(from + width * (last + 1), UINT32_MAX);
-}
-
 void rend_camera_bounds(const mospt_dataset *dataset, double low[3], double high[3])
 {
     const mospt_grid *grid = &dataset->metadata.grid;

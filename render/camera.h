@@ -56,10 +56,6 @@ void rend_camera_overview(const double low[3], const double high[3], double aspe
  * should show. */
 void rend_camera_bounds(const mospt_dataset *dataset, double low[3], double high[3]);
 
-/* Grid heights between which all but the lowest and highest hundredth of the points lie: what an
- * elevation ramp is for. */
-void rend_camera_heights(const mospt_dataset *dataset, uint32_t *low, uint32_t *high);
-
 /* The camera that the options ask for.
  * errors   MOSPT_EINVAL: not finite, eye on the target, a field of view out of range */
 bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *dataset,

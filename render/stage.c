@@ -42,7 +42,7 @@ struct rend_stage {
     uint32_t *gpu_paint;   /* [node count], owned: number of the paint of what is on the GPU */
     rend_legend legend;
 
-    uint32_t bounds_low[3], bounds_high[3], z_low, z_high;
+    uint32_t bounds_low[3], bounds_high[3];
 
     const rend_selection *selection;
     uint32_t *pinned; /* [pinned_count] nodes of the frame in hand, owned */
@@ -139,7 +139,6 @@ bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits 
     if (s == NULL) return mospt_err_nomem(err, sizeof *s);
     s->dataset = dataset, s->gl = gl;
     rend_frame_bounds(dataset, s->bounds_low, s->bounds_high);
-    rend_camera_heights(dataset, &s->z_low, &s->z_high);
     if (!make_caches(s, limits, wake, user, err)) {
         rend_stage_destroy(s);
         return false;
@@ -410,9 +409,6 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
     const rend_look *look = &view->look;
     rgl_scene scene = {
         .frame = s->frame,
-        .colour = REND_COLOUR_RGB, /* points come painted */
-        .z_low = s->z_low,
-        .z_high = s->z_high,
         .octants = look->size_mode == REND_SIZE_AUTO ? s->selection->octants : NULL,
         .octant_nodes = s->selection->draw_count,
         .grid_bits = s->dataset->metadata.grid.bits,

@@ -7,7 +7,7 @@
 
 typedef struct {
     GLuint name;
-    GLint anchor, offset, rotation, inverse_tan, range, splat, z_low, z_scale, grid_bits;
+    GLint anchor, offset, rotation, inverse_tan, range, splat, grid_bits;
 } points_program;
 
 typedef struct {
@@ -21,8 +21,8 @@ enum { OCTANTS_WIDTH = 1024 };                   /* texels; the shader knows it 
 typedef struct {
     rgl base;
     GLuint arena, arena_vao, empty_vao;
-    uint64_t arena_size;                                  /* vertices */
-    points_program points[REND_COLOUR_COUNT][KIND_COUNT]; /* made at first use */
+    uint64_t arena_size;               /* vertices */
+    points_program points[KIND_COUNT]; /* made at first use */
     shade_program shade;
     GLuint scene_fbo, colours, depths; /* of scene_width by scene_height; 0: none yet */
     GLuint picture_fbo, picture;
@@ -51,9 +51,8 @@ static void gl_destroy(rgl *gl)
     glDeleteBuffers(1, &g->arena);
     glDeleteVertexArrays(1, &g->arena_vao);
     glDeleteVertexArrays(1, &g->empty_vao);
-    for (int c = 0; c < REND_COLOUR_COUNT; c++)
-        for (int k = 0; k < KIND_COUNT; k++)
-            glDeleteProgram(g->points[c][k].name);
+    for (int k = 0; k < KIND_COUNT; k++)
+        glDeleteProgram(g->points[k].name);
     glDeleteProgram(g->shade.name);
     free(g);
 }
@@ -162,15 +161,11 @@ static bool fit_targets(gl_rgl *g, uint32_t width, uint32_t height, mospt_err *e
     return true;
 }
 
-static bool use_points_program(gl_rgl *g, rend_colour colour, int kind, const points_program **out,
-                               mospt_err *err)
+static bool use_points_program(gl_rgl *g, int kind, const points_program **out, mospt_err *err)
 {
-    static const char *const colours[REND_COLOUR_COUNT] = {"", "#define INTENSITY\n",
-                                                           "#define ELEVATION\n"};
-    points_program *p = &g->points[colour][kind];
+    points_program *p = &g->points[kind];
     if (p->name == 0) {
         char defines[64] = "";
-        strcat(defines, colours[colour]);
         strcat(defines, kind & ROUND ? "#define ROUND\n" : "");
         strcat(defines, kind & OCTANTS ? "#define OCTANTS\n" : "");
         if (!rgl_program_create(defines, RGL_POINTS_VERTEX, RGL_POINTS_FRAGMENT, &p->name, err))
@@ -181,8 +176,6 @@ static bool use_points_program(gl_rgl *g, rend_colour colour, int kind, const po
         p->inverse_tan = glGetUniformLocation(p->name, "inverse_tan");
         p->range = glGetUniformLocation(p->name, "range");
         p->splat = glGetUniformLocation(p->name, "splat");
-        p->z_low = glGetUniformLocation(p->name, "z_low");
-        p->z_scale = glGetUniformLocation(p->name, "z_scale");
         p->grid_bits = glGetUniformLocation(p->name, "grid_bits");
     }
     *out = p;
@@ -192,15 +185,12 @@ static bool use_points_program(gl_rgl *g, rend_colour colour, int kind, const po
 static void set_scene(const points_program *p, const rgl_scene *scene)
 {
     const rend_frame *f = &scene->frame;
-    float span = scene->z_high > scene->z_low ? (float)(scene->z_high - scene->z_low) : 1;
     GL(glUseProgram(p->name));
     GL(glUniform3uiv(p->anchor, 1, f->anchor));
     GL(glUniform3fv(p->offset, 1, f->offset));
     GL(glUniformMatrix3fv(p->rotation, 1, GL_FALSE, f->rotation));
     GL(glUniform2f(p->inverse_tan, 1 / f->tan_half[0], 1 / f->tan_half[1]));
     GL(glUniform2f(p->range, log2f(f->near_w), 1 / log2f(f->far_w / f->near_w)));
-    GL(glUniform1ui(p->z_low, scene->z_low));
-    GL(glUniform1f(p->z_scale, 1 / span));
     GL(glUniform1i(p->grid_bits, (GLint)scene->grid_bits));
     float size = scene->octants != NULL ? scene->splat_scale : scene->splat_size;
     GL(glUniform3f(p->splat, size * f->focal_px, scene->px_min, scene->px_max));
@@ -233,7 +223,7 @@ static bool draw_points(gl_rgl *g, const rgl_scene *scene, const rgl_batch *batc
         const points_program *p = NULL;
         int kind = (batches[b].round ? ROUND : 0) | (scene->octants != NULL ? OCTANTS : 0);
         if (batches[b].range_count == 0) continue;
-        if (!use_points_program(g, scene->colour, kind, &p, err)) return false;
+        if (!use_points_program(g, kind, &p, err)) return false;
         set_scene(p, scene);
         GL(glMultiDrawArrays(GL_POINTS, batches[b].first, batches[b].count,
                              (GLsizei)batches[b].range_count));

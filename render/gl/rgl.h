@@ -2,7 +2,8 @@
  *
  * Two backends implement it: gl.c talks to OpenGL 3.3 core, null.c counts and records, for tests.
  * One arena of vertices is the GPU cache; what belongs where in it is the caller's business
- * (render/pages.h). Vertices go in as they are in the file. A picture is drawn in parts: RGL_BEGIN
+ * (render/pages.h). Vertices go in as they are in the file, painted (render/paint.h): their r, g
+ * and b are what is drawn. A picture is drawn in parts: RGL_BEGIN
  * clears, any number of calls add points, RGL_END shades and puts it out.
  * threads  the one that has the context */
 #pragma once
@@ -13,8 +14,6 @@ typedef struct rgl rgl;
 
 typedef struct {
     rend_frame frame;
-    rend_colour colour;
-    uint32_t z_low, z_high; /* grid coordinates between which the elevation ramp runs */
     /* A splat is a square (or disc) of splat_scale times the cell that `octants` give for its
      * place, or of splat_size steps where there are none; on screen it is never narrower than
      * px_min, and never wider than px_max. */

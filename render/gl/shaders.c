@@ -5,7 +5,7 @@
  * eye (render/camera.h). */
 const char RGL_POINTS_VERTEX[] =
     "layout(location = 0) in uvec3 position;\n"
-    "layout(location = 1) in vec4 colour;\n" /* r, g, b, intensity */
+    "layout(location = 1) in vec4 colour;\n" /* r, g, b; intensity, which is not drawn */
     "uniform uvec3 anchor;\n"
     "uniform vec3 offset;\n"
     "uniform mat3 rotation;\n"
@@ -13,8 +13,6 @@ const char RGL_POINTS_VERTEX[] =
     "uniform vec2 range;\n" /* log2 of near, 1 / log2(far / near) */
     "uniform vec3 splat;\n" /* pixels at a distance of one step (of a cell of one step), least and
                                largest on screen */
-    "uniform uint z_low;\n"
-    "uniform float z_scale;\n"
     "flat out vec3 tint;\n"
     "#ifdef OCTANTS\n"
     "uniform usampler2D octants;\n"
@@ -35,23 +33,6 @@ const char RGL_POINTS_VERTEX[] =
     "#else\n"
     "float cell_at(uvec3 place) { return 1.0; }\n"
     "#endif\n"
-    "#ifdef ELEVATION\n"
-    /* Polynomial fit of the viridis ramp: equal steps of height look equally far apart, also
-     * without colour vision. Its darkest eighth is left out: eye-dome lighting needs something to
-     * darken. */
-    "vec3 ramp(float t)\n"
-    "{\n"
-    "    t = 0.125 + 0.875 * t;\n"
-    "    const vec3 c0 = vec3(0.2777273, 0.0054073, 0.3340998), c1 = vec3(0.1050930, 1.4046135, "
-    "1.3845902);\n"
-    "    const vec3 c2 = vec3(-0.3308618, 0.2148476, 0.0950952), c3 = vec3(-4.6342305, -5.7991010, "
-    "-19.3324410);\n"
-    "    const vec3 c4 = vec3(6.2282699, 14.1799334, 56.6905526), c5 = vec3(4.7763850, "
-    "-13.7451454, -65.3530326);\n"
-    "    const vec3 c6 = vec3(-5.4354559, 4.6458526, 26.3124352);\n"
-    "    return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))));\n"
-    "}\n"
-    "#endif\n"
     "void main()\n"
     "{\n"
     "    bvec3 ahead = greaterThanEqual(position, anchor);\n"
@@ -63,13 +44,7 @@ const char RGL_POINTS_VERTEX[] =
     "    float depth = (log2(max(w, 1e-30)) - range.x) * range.y;\n"
     "    gl_Position = vec4(eye.xy * inverse_tan, (2.0 * depth - 1.0) * w, w);\n"
     "    gl_PointSize = clamp(splat.x * cell_at(position) / max(w, 1e-30), splat.y, splat.z);\n"
-    "#if defined(ELEVATION)\n"
-    "    tint = ramp(clamp(float(max(position.z, z_low) - z_low) * z_scale, 0.0, 1.0));\n"
-    "#elif defined(INTENSITY)\n"
-    "    tint = colour.aaa;\n"
-    "#else\n"
     "    tint = colour.rgb;\n"
-    "#endif\n"
     "}\n";
 
 const char RGL_POINTS_FRAGMENT[] = "flat in vec3 tint;\n"
