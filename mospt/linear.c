@@ -1,8 +1,6 @@
 #include "mospt/linear.h"
 
-#include <stdlib.h>
-
-enum { FEW = 16 }; /* points in one cell, for a plain sort */
+enum { FEW = 64 }; /* points in one cell, for a plain sort */
 
 /* The points that stand for the cells of the present depth. */
 typedef struct {
@@ -21,28 +19,82 @@ static const uint8_t *record_of(const mospt_linear_input *in, uint64_t key)
     return mospt_records_at(in->records, mospt_linear_index(key, in->index_bits));
 }
 
-/* By their bytes. Most differ in the first one. */
-static int compare_records(const void *a, const void *b, void *user)
+/* The first byte from `at` on in which not all records are alike; the stride if there is none. */
+static size_t first_difference(const mospt_linear_input *in, const uint64_t *keys, uint32_t count,
+                               size_t at)
 {
-    const mospt_linear_input *in = user;
-    const uint8_t *x = record_of(in, *(const uint64_t *)a),
-                  *y = record_of(in, *(const uint64_t *)b);
-    return x[0] != y[0] ? x[0] - y[0] : memcmp(x, y, in->records->stride);
+    const uint8_t *first = record_of(in, keys[0]);
+    size_t end = in->records->stride;
+    for (uint32_t i = 1; i < count && end > at; i++) {
+        const uint8_t *record = record_of(in, keys[i]);
+        size_t alike = at;
+        while (alike < end && record[alike] == first[alike])
+            alike++;
+        end = alike;
+    }
+    return end;
 }
 
-static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count)
+/* Eight bytes of a record from `at` on, or its last eight, as a number that compares like them. */
+static uint64_t word_at(const mospt_linear_input *in, uint64_t key, size_t at)
 {
-    if (count > FEW) {
-        qsort_r(keys, count, sizeof *keys, compare_records, (void *)(uintptr_t)in);
+    uint64_t word;
+    size_t last = in->records->stride - sizeof word;
+    memcpy(&word, record_of(in, key) + (at < last ? at : last), sizeof word);
+    return __builtin_bswap64(word);
+}
+
+/* All records are alike before `at`, so a word that begins earlier decides as well. Words are taken
+ * first, since records stand anywhere, and the waits for them overlap. */
+static void sort_few(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
+{
+    uint64_t words[FEW];
+    size_t stride = in->records->stride;
+    for (uint32_t i = 0; i < count; i++)
+        words[i] = word_at(in, keys[i], at);
+    for (uint32_t i = 1; i < count; i++) {
+        uint64_t key = keys[i], word = words[i];
+        uint32_t to = i;
+        for (; to > 0 && words[to - 1] >= word; to--) {
+            if (words[to - 1] == word &&
+                memcmp(record_of(in, keys[to - 1]) + at, record_of(in, key) + at, stride - at) <= 0)
+                break;
+            words[to] = words[to - 1];
+            keys[to] = keys[to - 1];
+        }
+        words[to] = word;
+        keys[to] = key;
+    }
+}
+
+/* Sorts by the bytes of the records from `at` on: byte by byte, in place, since there may be as
+ * many in one cell as a node can hold. */
+static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
+{
+    uint32_t begin[UINT8_MAX + 2] = {0}, next[UINT8_MAX + 1];
+    if (at == in->records->stride || count < 2) return;
+    if (count <= FEW) {
+        sort_few(in, keys, count, at);
         return;
     }
-    for (uint32_t i = 1; i < count; i++) {
-        uint64_t key = keys[i];
-        uint32_t at = i;
-        for (; at > 0 && compare_records(&keys[at - 1], &key, (void *)(uintptr_t)in) > 0; at--)
-            keys[at] = keys[at - 1];
-        keys[at] = key;
+    at = first_difference(in, keys, count, at);
+    if (at == in->records->stride) return;
+    for (uint32_t i = 0; i < count; i++)
+        begin[record_of(in, keys[i])[at] + 1]++;
+    for (uint32_t v = 0; v <= UINT8_MAX; v++) {
+        begin[v + 1] += begin[v];
+        next[v] = begin[v];
     }
+    for (uint32_t v = 0; v <= UINT8_MAX; v++)
+        while (next[v] < begin[v + 1]) {
+            uint32_t here = next[v];
+            uint64_t key = keys[here];
+            uint32_t there = next[record_of(in, key)[at]]++;
+            keys[here] = keys[there];
+            keys[there] = key;
+        }
+    for (uint32_t v = 0; v <= UINT8_MAX; v++)
+        sort_cell(in, keys + begin[v], begin[v + 1] - begin[v], at + 1);
 }
 
 /* The order in which points arrived must not show in the result: only their bytes order the points
@@ -53,7 +105,7 @@ static void sort_shared_cells(const mospt_linear_input *in, uint64_t *keys, uint
         uint64_t cell = keys[a] >> in->cell_shift;
         for (b = a + 1; b < count && keys[b] >> in->cell_shift == cell;)
             b++;
-        if (b - a > 1) sort_cell(in, keys + a, b - a);
+        if (b - a > 1) sort_cell(in, keys + a, b - a, 0);
     }
 }
 

@@ -81,4 +81,3 @@ bool prep_output_take_place(const prep_output *output, mospt_err *err)
         return false;
     return mospt_file_remove_tree(output->target, err);
 }
-

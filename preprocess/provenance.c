@@ -53,7 +53,7 @@ static bool keep_crs(mospt_source *to, const char *crs, const char *of_site)
 }
 
 bool prep_provenance_fill(mospt_metadata *m, const prep_source *source,
- const prep_pack_sums *of_scan, const char *crs, mospt_err *err)
+                          const prep_pack_sums *of_scan, const char *crs, mospt_err *err)
 {
     prep_pack_sums all = prep_pack_sums_empty;
     m->sources = calloc(source->scan_count, sizeof *m->sources);
@@ -82,7 +82,6 @@ bool prep_provenance_fill(mospt_metadata *m, const prep_source *source,
     return true;
 }
 
-
 /* Text goes in with its end, so that no two lists of texts are the same bytes. */
 static uint64_t add_text(uint64_t hash, const char *text)
 {
@@ -106,8 +105,8 @@ uint64_t prep_provenance_hash(const mospt_metadata *m, const prep_source *source
     const prep_scan_options *o = &source->options;
     const mospt_grid *g = &m->grid;
     const double reals[] = {g->offset[0], g->offset[1], g->offset[2], g->step};
-    const int64_t integers[] = {g->base[0], g->base[1],     g->base[2],      g->bits,
-                                g->root[0], g->root[1],     g->root[2],      m->inner_depth,
+    const int64_t integers[] = {g->base[0], g->base[1],  g->base[2],       g->bits,
+                                g->root[0], g->root[1],  g->root[2],       m->inner_depth,
                                 dedupe,     o->has_crop, m->add_threshold, o->has_range};
     uint64_t hash = add_text(0, IPTS_VERSION);
     hash = mospt_hash_more(hash, reals, sizeof reals);

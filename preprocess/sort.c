@@ -4,6 +4,9 @@
 
 /* Radix sort, least digit first. 11 bits: few digits, and counters that fit the first cache. */
 enum { DIGIT_BITS = 11, DIGITS_MAX = 6, VALUES = 1 << DIGIT_BITS, FEW = 64 };
+/* Records that are fetched before their turn, where keys have been sorted before and they stand
+ * anywhere. */
+enum { AHEAD = 16 };
 
 static void sort_few(uint64_t *keys, uint32_t count, uint32_t low_bit)
 {
@@ -78,6 +81,9 @@ void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint6
     uint32_t bits = mospt_cell_bits(s->grid, level);
     for (uint32_t i = 0; i < count; i++) {
         uint32_t index = mospt_linear_index(keys[i], s->index_bits);
+        if (i + AHEAD < count)
+            __builtin_prefetch(
+                mospt_records_at(s->records, mospt_linear_index(keys[i + AHEAD], s->index_bits)));
         mospt_vertex v = mospt_vertex_of(mospt_records_at(s->records, index));
         keys[i] = mospt_cell_code(v.x, v.y, v.z, bits, s->code_levels) << s->index_bits | index;
         if (s->colours != NULL) memcpy(&s->colours[index], &v.r, sizeof s->colours[index]);

@@ -16,7 +16,7 @@ static char root[512];
 
 static void put(const char *name, const void *bytes, size_t size)
 {
-    char path[1024];
+    char path[2048];
     snprintf(path, sizeof path, "%s/%s", root, name);
     FILE *f = fopen(path, "wb");
     assert_non_null(f);
