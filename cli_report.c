@@ -179,16 +179,17 @@ void cli_report_build_json(FILE *out, const char *output, const prep_build_resul
         json_object_set_new(seconds, prep_phase_name((prep_phase)p), json_real(r->seconds[p]));
     json_object_set_new(seconds, "total", json_real(r->total_seconds));
     cli_write_json(
-        out,
-        json_pack(
-            "{s:o, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:o}",
-            "output", cli_text_json(output), "points", (json_int_t)m->point_count, "kept_points",
-            (json_int_t)r->kept_points, "dropped", (json_int_t)points_dropped(m), "bounds",
-            bounds_json(m), "crs", cli_text_json(m->crs), "sources", sources_json(m), "left_out",
-            left_out, "unknown", unknown, "nodes", (json_int_t)r->node_count, "levels",
-            (json_int_t)r->level_count, "bytes", (json_int_t)r->payload_bytes, "position_error",
-            m->position_error, "step", m->grid.step, "peak_memory", (json_int_t)r->peak_memory,
-            "scratch_bytes", (json_int_t)r->scratch_bytes, "seconds", seconds));
+        out, json_pack("{s:o, s:I, s:I, s:I, s:o, s:o, s:o, s:o, s:o, s:I, s:I, s:I, s:f, s:f, "
+                       "s:I, s:I, s:I, s:o}",
+                       "output", cli_text_json(output), "points", (json_int_t)m->point_count,
+                       "kept_points", (json_int_t)r->kept_points, "dropped",
+                       (json_int_t)points_dropped(m), "bounds", bounds_json(m), "crs",
+                       cli_text_json(m->crs), "sources", sources_json(m), "left_out", left_out,
+                       "unknown", unknown, "nodes", (json_int_t)r->node_count, "levels",
+                       (json_int_t)r->level_count, "bytes", (json_int_t)r->payload_bytes,
+                       "position_error", m->position_error, "step", m->grid.step, "peak_memory",
+                       (json_int_t)r->peak_memory, "scratch_bytes", (json_int_t)r->scratch_bytes,
+                       "scratch_announced", (json_int_t)r->scratch_announced, "seconds", seconds));
 }
 
 static void print_sources(FILE *out, const mospt_metadata *m)

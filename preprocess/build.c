@@ -177,9 +177,10 @@ static bool check_disks(build *b, mospt_err *err)
     uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema),
              scratch = bytes + bytes / 16;
     if (bytes < b->plan.store_memory) scratch = 0;
+    b->result->scratch_announced = scratch + b->result->source.spool_size;
     if (b->options->announce != NULL)
-        b->options->announce(b->options->context, b->points_total,
-                             scratch + b->result->source.spool_size, bytes);
+        b->options->announce(b->options->context, b->points_total, b->result->scratch_announced,
+                             bytes);
     if (!check_space(b->scratch_folder, scratch, "scratch space", err)) return false;
     char *folder = prep_output_folder(b->output.target);
     bool ok = folder != NULL && check_space(folder, bytes, "the dataset", err);

@@ -48,7 +48,8 @@ typedef struct {
     prep_folder_list files;
     uint32_t node_count, level_count;
     uint64_t kept_points; /* that an interrupted build had left, and need not be written again */
-    uint64_t payload_bytes, scratch_bytes, peak_memory;
+    uint64_t payload_bytes, peak_memory;
+    uint64_t scratch_bytes, scratch_announced; /* used at the most, and said before */
     double seconds[PREP_PHASES], total_seconds;
 } prep_build_result;
 

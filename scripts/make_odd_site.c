@@ -1,5 +1,6 @@
 /* scripts/make_odd_site.c - sites that bring trees and sorts to their worst, to be built in about
- * the time of an ordinary one. Binary PLY; the same arguments give the same bytes. */
+ * the time of an ordinary one. Binary PLY with doubles, or PCD with floats for programs that read
+ * nothing else; the same arguments give the same bytes. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -7,7 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { COPIES = 10000, RECORD_SIZE = 27, BUFFER_RECORDS = 4096 };
+enum { COPIES = 10000, RECORD_SIZE_MAX = 27, BUFFER_RECORDS = 4096 };
+
+static const char PLY_HEADER[] =
+    "ply\nformat binary_little_endian 1.0\nelement vertex %llu\nproperty double x\n"
+    "property double y\nproperty double z\nproperty uchar red\nproperty uchar green\n"
+    "property uchar blue\nend_header\n";
+static const char PCD_HEADER[] =
+    "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH %1$llu\n"
+    "HEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS %1$llu\nDATA binary\n";
 
 typedef struct {
     uint64_t random, left; /* points that are still to come, this one included */
@@ -112,20 +121,33 @@ static int find_kind(const char *name)
     return k;
 }
 
-static bool write_points(FILE *out, void (*make)(maker *m), uint64_t count)
+/* Writes a record, and returns where the next one goes. */
+static uint8_t *put(uint8_t *to, const double at[3], uint64_t colour, bool is_pcd)
 {
-    static uint8_t buffer[BUFFER_RECORDS * RECORD_SIZE];
+    for (int a = 0; a < 3; a++) {
+        float narrow = (float)at[a];
+        if (is_pcd) memcpy(to, &narrow, sizeof narrow);
+        else memcpy(to, &at[a], sizeof at[a]);
+        to += is_pcd ? sizeof narrow : sizeof at[a];
+    }
+    colour &= 0xffffff;
+    memcpy(to, &colour, is_pcd ? 4 : 3);
+    return to + (is_pcd ? 4 : 3);
+}
+
+static bool write_points(FILE *out, void (*make)(maker *m), uint64_t count, bool is_pcd)
+{
+    static uint8_t buffer[BUFFER_RECORDS * RECORD_SIZE_MAX];
     maker m = {.random = 1, .left = count};
-    size_t filled = 0;
+    uint8_t *end = buffer;
     for (; m.left > 0; m.left--) {
-        uint8_t *record = buffer + filled++ * RECORD_SIZE;
         uint64_t colour = next_random(&m.random);
         make(&m);
-        memcpy(record, m.at, sizeof m.at);
-        memcpy(record + sizeof m.at, &colour, 3);
-        if (filled < BUFFER_RECORDS && m.left > 1) continue;
-        if (fwrite(buffer, RECORD_SIZE, filled, out) != filled) return false;
-        filled = 0;
+        end = put(end, m.at, colour, is_pcd);
+        if (m.left > 1 && end <= buffer + sizeof buffer - RECORD_SIZE_MAX) continue;
+        size_t size = (size_t)(end - buffer);
+        if (fwrite(buffer, 1, size, out) != size) return false;
+        end = buffer;
     }
     return true;
 }
@@ -133,21 +155,20 @@ static bool write_points(FILE *out, void (*make)(maker *m), uint64_t count)
 int main(int argc, char **argv)
 {
     int kind = argc == 4 ? find_kind(argv[1]) : KIND_COUNT;
-    uint64_t count = argc == 4 ? strtoull(argv[2], NULL, 10) : 0;
+    unsigned long long count = argc == 4 ? strtoull(argv[2], NULL, 10) : 0;
     if (kind == KIND_COUNT || count == 0) {
-        fprintf(stderr, "usage: make_odd_site KIND POINTS FILE.ply\n");
+        fprintf(stderr, "usage: make_odd_site KIND POINTS FILE.ply|FILE.pcd\n");
         for (int k = 0; k < KIND_COUNT; k++)
             fprintf(stderr, "  %-7s %s\n", KINDS[k].name, KINDS[k].what);
         return 2;
     }
+    size_t n = strlen(argv[3]);
+    bool is_pcd = n > 4 && strcmp(argv[3] + n - 4, ".pcd") == 0;
     FILE *out = fopen(argv[3], "wb");
-    bool ok = out != NULL &&
-              fprintf(out,
-                      "ply\nformat binary_little_endian 1.0\nelement vertex %llu\n"
-                      "property double x\nproperty double y\nproperty double z\n"
-                      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
-                      (unsigned long long)count) > 0 &&
-              write_points(out, KINDS[kind].make, count);
+    bool ok = out != NULL;
+    if (ok && is_pcd) ok = fprintf(out, PCD_HEADER, count) > 0;
+    else if (ok) ok = fprintf(out, PLY_HEADER, count) > 0;
+    ok = ok && write_points(out, KINDS[kind].make, count, is_pcd);
     if (out != NULL && fclose(out) != 0) ok = false;
     if (!ok) perror(argv[3]);
     return ok ? 0 : 1;
