@@ -140,7 +140,7 @@ static int32_t channel(uint32_t colour, int c)
 /* Section 4.6: of the points standing for the children of a cell, the one whose colour is nearest
  * to their average; the first of several. Distances are compared as |n c - sum|^2, in integers, so
  * that every machine decides alike. */
-static uint32_t choose(const uint32_t *colours, uint32_t n)
+static uint32_t choose_of_many(const uint32_t *colours, uint32_t n)
 {
     int64_t sum[3] = {0}, best_distance = INT64_MAX;
     uint32_t best = 0;
@@ -158,8 +158,8 @@ static uint32_t choose(const uint32_t *colours, uint32_t n)
     return best;
 }
 
-/* The same for the up to eight children of an inner cell, where 32 bits do. */
-static uint32_t choose_child(const uint32_t *colours, uint32_t n)
+/* For eight points 32 bits do. */
+uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t n)
 {
     int32_t sum[3] = {0}, best_distance = INT32_MAX, count = (int32_t)n;
     uint32_t best = 0;
@@ -185,8 +185,9 @@ static uint32_t rise(standing *s, uint32_t count, uint32_t depth, uint8_t *level
         for (b = a + 1; b < count && s->boundary[b] > depth;)
             b++;
         uint32_t chosen = a;
-        if (b - a > 1 && b - a <= MOSPT_CHILDREN_MAX) chosen += choose_child(s->colour + a, b - a);
-        else if (b - a > 1) chosen += choose(s->colour + a, b - a);
+        if (b - a > 1 && b - a <= MOSPT_CHILDREN_MAX)
+            chosen += mospt_linear_choose(s->colour + a, b - a);
+        else if (b - a > 1) chosen += choose_of_many(s->colour + a, b - a);
         level[s->place[chosen]] = (uint8_t)depth;
         s->place[out] = s->place[chosen];
         s->colour[out] = s->colour[chosen];

@@ -38,6 +38,11 @@ size_t mospt_linear_work_size(uint32_t count);
 void mospt_linear_build(const mospt_linear_input *input, uint64_t *keys, uint32_t count, void *work,
                         uint32_t *order, uint32_t *level_end);
 
+/* Which of up to eight points that stand for the children of a cell stands for the cell itself
+ * (section 4.6).
+ * colours  [count], in Morton order */
+uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t count);
+
 /* Number of leading points to draw so that cells of the level drawn are at most `max_px` wide on
  * screen, or all. root_px  projected width of the node's cube, pixels; each level halves it */
 static inline uint32_t mospt_linear_prefix(const uint32_t *level_end, uint32_t depth, float root_px,

@@ -1,6 +1,8 @@
 #include "mospt/writer.h"
 
 #include "mospt/file.h"
+#include "mospt/hash.h"
+#include "mospt/point.h"
 
 #include <assert.h>
 #include <dirent.h>
@@ -14,7 +16,7 @@
 #include <unistd.h>
 
 /* Levels from here on share the last file: only piles of identical positions get so deep. */
-enum { FILES_MAX = 64 };
+enum { FILES_MAX = 64, PIECE_SIZE = 1 << 18 };
 #define PAYLOAD_NAME "points-%02u.bin"
 #define UNFINISHED_NAME "unfinished-%06" PRIu64 ".bin"
 
@@ -151,7 +153,7 @@ static bool add_file(mospt_writer *w, mospt_err *err)
     snprintf(name, sizeof name, PAYLOAD_NAME, w->file_count);
     char *path = mospt_file_join(w->path, name);
     if (path == NULL) return mospt_err_nomem(err, strlen(w->path));
-    int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+    int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (fd < 0) mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
     else w->fd[w->file_count++] = fd;
     free(path);
@@ -218,12 +220,43 @@ void mospt_writer_complete(mospt_writer *w, uint32_t index, const mospt_node *no
 bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
                         mospt_err *err)
 {
-    int fd = w->fd[node->payload_file];
-    if (!mospt_file_write_at(fd, w->path, node->payload_offset, payload, (size_t)node->payload_size,
-                             err))
+    if (!mospt_writer_write_part(w, node, 0, payload, (size_t)node->payload_size, err))
         return false;
-    mospt_file_start_flush(fd, node->payload_offset, node->payload_size);
+    mospt_file_start_flush(w->fd[node->payload_file], node->payload_offset, node->payload_size);
     return true;
+}
+
+bool mospt_writer_write_part(mospt_writer *w, const mospt_node *node, uint64_t skip,
+                             const uint8_t *bytes, size_t size, mospt_err *err)
+{
+    return mospt_file_write_at(w->fd[node->payload_file], w->path, node->payload_offset + skip,
+                               bytes, size, err);
+}
+
+static bool hash_range(const mospt_writer *w, const mospt_node *node, uint64_t skip, uint64_t size,
+                       uint64_t *hash, mospt_err *err)
+{
+    mospt_hasher *hasher = mospt_hasher_create();
+    uint8_t *bytes = malloc(PIECE_SIZE);
+    bool ok = (hasher != NULL && bytes != NULL) || mospt_err_nomem(err, PIECE_SIZE);
+    for (uint64_t done = 0; ok && done < size; done += PIECE_SIZE) {
+        size_t piece = size - done < PIECE_SIZE ? (size_t)(size - done) : PIECE_SIZE;
+        ok = mospt_file_read_at(w->fd[node->payload_file], w->path,
+                                node->payload_offset + skip + done, bytes, piece, err);
+        if (ok) mospt_hasher_add(hasher, bytes, piece);
+    }
+    if (ok) *hash = mospt_hasher_hash(hasher);
+    mospt_hasher_destroy(hasher);
+    free(bytes);
+    return ok;
+}
+
+bool mospt_writer_hash(mospt_writer *w, mospt_node *node, mospt_err *err)
+{
+    uint64_t vertices = (uint64_t)node->count * sizeof(mospt_vertex);
+    return hash_range(w, node, 0, vertices, &node->vertices_hash, err) &&
+           hash_range(w, node, vertices, node->payload_size - vertices, &node->attributes_hash,
+                      err);
 }
 
 uint64_t mospt_writer_bytes(const mospt_writer *writer)

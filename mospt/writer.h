@@ -38,6 +38,14 @@ bool mospt_writer_place(mospt_writer *writer, mospt_node *node, uint32_t *index,
 bool mospt_writer_write(mospt_writer *writer, const mospt_node *node, const uint8_t *payload,
                         mospt_err *err);
 
+/* Writes some of the payload of a node that is written in pieces, `skip` bytes into it. threads: as
+ * above */
+bool mospt_writer_write_part(mospt_writer *writer, const mospt_node *node, uint64_t skip,
+                             const uint8_t *bytes, size_t size, mospt_err *err);
+
+/* Sets the hashes of a node whose payload was written in pieces, by reading it back. */
+bool mospt_writer_hash(mospt_writer *writer, mospt_node *node, mospt_err *err);
+
 /* Says that a node is written, and the rest of it: level_end, and what mospt_payload_pack() sets.
  * points_hash  sum of the hashes of its points
  * threads      any */

@@ -1,5 +1,6 @@
 #include "preprocess/arena.h"
 
+#include <assert.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,6 +76,12 @@ static bool find_gap(const prep_arena *a, size_t size, uint32_t *index, size_t *
         free_from = i < a->count ? a->pieces[i].end : a->size;
     }
     return false;
+}
+
+void prep_arena_clear(prep_arena *arena)
+{
+    assert(arena->count == 0);
+    if (arena->memory != NULL) madvise(arena->memory, arena->size, MADV_DONTNEED);
 }
 
 void *prep_arena_take(prep_arena *a, size_t size)

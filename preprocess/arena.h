@@ -16,5 +16,8 @@ void prep_arena_destroy(prep_arena *arena);
  * any */
 void *prep_arena_take(prep_arena *arena, size_t size);
 
+/* Gives the pages back to the system; nothing of the arena is taken now. */
+void prep_arena_clear(prep_arena *arena);
+
 /* Gives a piece back; NULL is fine. threads: any */
 void prep_arena_give(prep_arena *arena, void *piece);

@@ -1,6 +1,7 @@
 #include "preprocess/finish.h"
 
 #include "preprocess/feed.h"
+#include "preprocess/large_node.h"
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -35,7 +36,8 @@ typedef struct {
     mospt_err err; /* of the first failure */
 } line;
 
-/* One thread's memory for the payload of a node. */
+/* One thread's memory for the payload of a node; of a large one it is given back at once. */
+enum { BUFFER_KEPT_SIZE = 8 << 20 };
 typedef struct {
     void *memory; /* [size], owned */
     size_t size;
@@ -44,6 +46,12 @@ typedef struct {
 size_t prep_finish_size(size_t record_size, uint64_t count)
 {
     return (size_t)count * record_size + prep_solve_work_size((uint32_t)count);
+}
+
+size_t prep_finish_emit_size(size_t record_size, uint64_t count)
+{
+    return (size_t)count * (record_size + sizeof(uint32_t)) +
+           mospt_linear_work_size((uint32_t)count);
 }
 
 static uint64_t count_of(const prep_finish_part *part)
@@ -186,7 +194,12 @@ static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, 
         if (b->memory == NULL) return mospt_err_nomem(err, size);
     }
     *hash = prep_solve_emit(env->shape, &i->records, &i->made, n, b->memory);
-    return mospt_writer_write(env->writer, &i->made.nodes[n].node, b->memory, err);
+    bool ok = mospt_writer_write(env->writer, &i->made.nodes[n].node, b->memory, err);
+    if (b->size > BUFFER_KEPT_SIZE) {
+        free(b->memory);
+        *b = (buffer){0};
+    }
+    return ok;
 }
 
 /* Under the lock: the account of a node that is written. */
@@ -309,6 +322,8 @@ static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts
 static bool finish_large(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
 {
     prep_pass *pass = NULL;
+    prep_arena_clear(env->arena);
+    if (part->is_node) return prep_large_node(env, part, err);
     if (!prep_pass_begin(env, part->corner, part->level, &pass, err)) return false;
     if (prep_feed_spool(env, pass, part->spools[0], err)) return prep_pass_end(pass, err);
     prep_pass_abandon(pass);
@@ -320,9 +335,9 @@ bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_e
     uint32_t begin = 0;
     for (uint32_t i = 0; i < list->part_count; i++) {
         const prep_finish_part *part = &list->parts[i];
-        if (part->is_node || count_of(part) <= env->solve_points ||
-            find_kept(env, part) != MOSPT_NO_NODE)
-            continue;
+        bool fits = count_of(part) <= env->solve_points ||
+                    (part->is_node && env->shape->inner_depth == MOSPT_DEPTH_MIN);
+        if (fits || find_kept(env, part) != MOSPT_NO_NODE) continue;
         if (!finish_small(env, list->parts + begin, i - begin, err) ||
             !finish_large(env, part, err))
             return false;

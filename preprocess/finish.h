@@ -26,6 +26,9 @@ typedef struct {
 /* Bytes of memory that finishing so many points in one go takes. */
 size_t prep_finish_size(size_t record_size, uint64_t count);
 
+/* Bytes of memory that making the payloads of so many points takes meanwhile. */
+size_t prep_finish_emit_size(size_t record_size, uint64_t count);
+
 /* Finishes all parts, in their order. */
 bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_err *err);
 

@@ -63,9 +63,15 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
             (unsigned long long)(((taken + (taken >> 3)) >> 20) + 1 > PREP_MEMORY_MIN_MIB
                                      ? ((taken + (taken >> 3)) >> 20) + 1
                                      : PREP_MEMORY_MIN_MIB));
-    plan.solve_memory = (size_t)((memory - taken) / 8 * 4);
     plan.store_memory = (size_t)((memory - taken) / 8 * 3);
-    plan.solve_points = plan.solve_memory / prep_finish_size(record_size, 1);
+    /* When rejection files are finished, a pass has given back its cells and batches. While some of
+     * their points are being solved, as many may be on their way to the disk. */
+    uint64_t finish =
+        (memory - taken) / 8 * 4 + cells + plan.batch_slices * slice_size(record_size);
+    size_t solve_size = prep_finish_size(record_size, 1),
+           emit_size = prep_finish_emit_size(record_size, 1);
+    plan.solve_memory = (size_t)(finish / (solve_size + emit_size) * solve_size);
+    plan.solve_points = plan.solve_memory / solve_size;
     if (plan.solve_points > SOLVE_POINTS_MAX) plan.solve_points = SOLVE_POINTS_MAX;
     *out = plan;
     return true;

@@ -17,11 +17,12 @@ static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, 
     assert_true(3 * (p->levels + depth - 1) <= 32); /* codes of a pass are 32 bits */
     assert_true(p->batch_slices > 0 && p->block_size > 0 && p->solve_memory > 0);
     assert_true(p->solve_points * prep_finish_size(record_size, 1) <= p->solve_memory);
-    uint64_t sum = prep_pass_cells_size(p->levels, depth) +
-                   buckets * (p->levels + 1) * p->block_size +
-                   (uint64_t)p->batch_slices * PREP_PASS_SLICE * 2 * record_size + p->solve_memory +
-                   p->store_memory;
-    assert_true(sum <= memory);
+    uint64_t store = buckets * (p->levels + 1) * p->block_size + p->store_memory;
+    uint64_t in_pass = prep_pass_cells_size(p->levels, depth) +
+                       (uint64_t)p->batch_slices * PREP_PASS_SLICE * 2 * record_size;
+    uint64_t in_finish = p->solve_memory + prep_finish_emit_size(record_size, p->solve_points);
+    assert_true(store + in_pass <= memory);
+    assert_true(store + in_finish <= memory);
 }
 
 static void parts_never_sum_to_more_than_was_given(void **state)

@@ -1,0 +1,262 @@
+#include "preprocess/large_node.h"
+
+#include <stdlib.h>
+
+enum {
+    OCTANTS = 8,
+    BELOW_CUT = 5, /* levels: a cell at the cut has 8^5 finest cells */
+    CUT_MAX = 3,   /* but no more cells than a pass has octants */
+    ALIGNMENT = 64,
+};
+
+/* A cell at the cut. */
+typedef struct {
+    prep_spool spool;
+    uint32_t corner[3];
+    uint32_t level_end[MOSPT_LEVELS_MAX]; /* of its own MOSPT */
+    uint32_t colour;                      /* of the point that stands for it */
+    uint8_t depth;                        /* of the node's inner octree at which that stands */
+} cell;
+
+typedef struct {
+    const prep_pass_env *env;
+    const prep_finish_part *part;
+    prep_shape shape; /* of the cells */
+    uint32_t cut;     /* levels of the inner octree above it */
+    uint32_t cell_count;
+    cell *cells; /* [cell_count], owned, in Morton order */
+    mospt_node node;
+    uint64_t points_hash;
+} large;
+
+static void cell_corner(const large *l, uint32_t code, uint32_t out[3])
+{
+    memcpy(out, l->part->corner, 3 * sizeof *out);
+    for (uint32_t j = 0; j < l->cut; j++)
+        mospt_cell_child(l->env->shape->grid, out, l->part->level + j,
+                         code >> 3 * (l->cut - 1 - j) & (OCTANTS - 1), out);
+}
+
+/* Sends the points of a spool to their cells. */
+static bool divide_spool(large *l, prep_spool *spool, uint8_t *block, mospt_err *err)
+{
+    prep_store *store = l->env->store;
+    size_t stride = mospt_record_size(l->env->shape->schema);
+    uint32_t bits = mospt_cell_bits(l->env->shape->grid, l->part->level), n;
+    for (uint32_t b = 0; b < spool->block_count; b++) {
+        if (!prep_spool_take_block(store, spool, b, block, &n, err)) return false;
+        for (uint32_t i = 0; i < n; i++) {
+            mospt_vertex v = mospt_vertex_of(block + i * stride);
+            uint32_t code = (uint32_t)mospt_cell_code(v.x, v.y, v.z, bits, l->cut);
+            if (!prep_spool_append(store, &l->cells[code].spool, block + i * stride, stride, err))
+                return false;
+        }
+    }
+    prep_spool_drop(store, spool);
+    return true;
+}
+
+static bool divide(large *l, mospt_err *err)
+{
+    uint8_t *block = malloc(prep_store_block_size(l->env->store));
+    bool ok = block != NULL || mospt_err_nomem(err, prep_store_block_size(l->env->store));
+    for (uint32_t s = 0; ok && s < l->part->spool_count; s++) {
+        l->node.count += (uint32_t)l->part->spools[s]->count;
+        ok = divide_spool(l, l->part->spools[s], block, err);
+    }
+    for (uint32_t c = 0; ok && c < l->cell_count; c++)
+        ok = prep_spool_seal(l->env->store, &l->cells[c].spool, err);
+    free(block);
+    return ok;
+}
+
+/* What is done with the payload of a cell. */
+typedef bool (*use_payload)(large *l, cell *c, const uint8_t *payload, uint64_t points_hash,
+                            mospt_err *err);
+
+static size_t aligned(size_t size)
+{
+    return (size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+}
+
+/* Makes the MOSPT of one cell.
+ * memory   for solving, the blocks that are on the disk, and the payload */
+static bool make_cell(large *l, cell *c, uint8_t *memory, use_payload use, mospt_err *err)
+{
+    const prep_pass_env *env = l->env;
+    uint32_t count = (uint32_t)c->spool.count;
+    const uint8_t **blocks = malloc(c->spool.block_count * sizeof *blocks);
+    uint8_t *records = memory + aligned(prep_solve_work_size(count)),
+            *payload = records + aligned(prep_spool_size_on_disk(env->store, &c->spool));
+    mospt_records view = {.blocks = blocks,
+                          .stride = mospt_record_size(l->shape.schema),
+                          .shift = prep_store_block_shift(env->store)};
+    prep_subtree made = {0};
+    if (blocks == NULL) return mospt_err_nomem(err, c->spool.block_count * sizeof *blocks);
+    bool ok = prep_spool_view(env->store, &c->spool, records, blocks, err) &&
+              prep_solve_node(&l->shape, c->corner, l->part->level + l->cut, 0, &view, count,
+                              memory, &made, err);
+    if (ok) {
+        uint64_t hash = prep_solve_emit(&l->shape, &view, &made, 0, payload);
+        memcpy(c->level_end, made.nodes[0].node.level_end, sizeof c->level_end);
+        ok = use(l, c, payload, hash, err);
+    }
+    prep_subtree_fini(&made);
+    free(blocks);
+    return ok;
+}
+
+static size_t make_cell_size(const large *l, const cell *c)
+{
+    uint32_t count = (uint32_t)c->spool.count;
+    return aligned(prep_solve_work_size(count)) +
+           aligned(prep_spool_size_on_disk(l->env->store, &c->spool)) +
+           prep_solve_emit_size(&l->shape, count);
+}
+
+static bool make_all(large *l, use_payload use, mospt_err *err)
+{
+    size_t size = 0;
+    for (uint32_t c = 0; c < l->cell_count; c++)
+        if (make_cell_size(l, &l->cells[c]) > size) size = make_cell_size(l, &l->cells[c]);
+    uint8_t *memory = prep_arena_take(l->env->arena, size);
+    bool of_arena = memory != NULL, ok = true;
+    /* Attributes by the kilobyte: better too much memory than none. */
+    if (!of_arena && (memory = malloc(size)) == NULL) return mospt_err_nomem(err, size);
+    for (uint32_t c = 0; ok && c < l->cell_count; c++)
+        if (l->cells[c].spool.count > 0) ok = make_cell(l, &l->cells[c], memory, use, err);
+    if (of_arena) prep_arena_give(l->env->arena, memory);
+    else free(memory);
+    return ok;
+}
+
+static bool note_cell(large *l, cell *c, const uint8_t *payload, uint64_t points_hash,
+                      mospt_err *err)
+{
+    mospt_vertex first;
+    (void)err;
+    memcpy(&first, payload, sizeof first);
+    memcpy(&c->colour, &first.r, sizeof c->colour);
+    c->depth = (uint8_t)l->cut;
+    l->points_hash += points_hash;
+    return true;
+}
+
+/* Of the cells that share one at `depth`, the point of one stands for it. Returns how many cells
+ * are left standing.
+ * standing  [count] numbers of cells */
+static uint32_t rise(large *l, uint32_t *standing, uint32_t count, uint32_t depth)
+{
+    uint32_t shift = 3 * (l->cut - depth), out = 0;
+    for (uint32_t a = 0, b; a < count; a = b) {
+        uint32_t colours[OCTANTS];
+        for (b = a; b < count && standing[b] >> shift == standing[a] >> shift; b++)
+            colours[b - a] = l->cells[standing[b]].colour;
+        uint32_t chosen = standing[a + mospt_linear_choose(colours, b - a)];
+        l->cells[chosen].depth = (uint8_t)depth;
+        standing[out++] = chosen;
+    }
+    return out;
+}
+
+static bool sum_up(large *l, mospt_err *err)
+{
+    uint32_t count = 0, *standing = malloc(l->cell_count * sizeof *standing);
+    if (standing == NULL) return mospt_err_nomem(err, l->cell_count * sizeof *standing);
+    for (uint32_t c = 0; c < l->cell_count; c++)
+        if (l->cells[c].spool.count > 0) standing[count++] = c;
+    for (uint32_t depth = l->cut; depth-- > 0;) {
+        count = rise(l, standing, count, depth);
+        l->node.level_end[depth] = count;
+    }
+    free(standing);
+    /* From the cut on, the levels of the node are those of the cells together. */
+    for (uint32_t c = 0; c < l->cell_count; c++)
+        for (uint32_t i = 0; l->cells[c].spool.count > 0 && i < l->shape.inner_depth + 2; i++)
+            l->node.level_end[l->cut + i] += l->cells[c].level_end[i];
+    return true;
+}
+
+/* Writes points [begin, end) of a cell to place `to` of the node, plane by plane. */
+static bool write_run(large *l, const cell *c, const uint8_t *payload, uint32_t begin, uint32_t end,
+                      uint32_t to, mospt_err *err)
+{
+    const mospt_schema *schema = l->env->shape->schema;
+    size_t of_cell = c->spool.count, of_node = l->node.count, before = 0;
+    for (uint32_t k = 0; k <= schema->count; k++) {
+        const mospt_attribute *a = k > 0 ? &schema->at[k - 1] : NULL;
+        size_t size =
+            a != NULL ? mospt_type_size(a->type) * a->components : sizeof(mospt_vertex);
+        if (!mospt_writer_write_part(l->env->writer, &l->node, before * of_node + to * size,
+                                     payload + before * of_cell + begin * size,
+                                     (end - begin) * size, err))
+            return false;
+        before += size;
+    }
+    return true;
+}
+
+/* The point that stands for the cell goes to the level where it does; what the other levels of the
+ * cell add, to those of the node. */
+static bool write_cell(large *l, cell *c, const uint8_t *payload, uint64_t points_hash,
+                       mospt_err *err)
+{
+    uint32_t *next = l->node.level_end;
+    (void)points_hash;
+    if (!write_run(l, c, payload, 0, 1, next[c->depth]++, err)) return false;
+    for (uint32_t i = 1; i < l->shape.inner_depth + 2; i++) {
+        uint32_t begin = c->level_end[i - 1], end = c->level_end[i];
+        if (begin < end && !write_run(l, c, payload, begin, end, next[l->cut + i], err))
+            return false;
+        next[l->cut + i] += end - begin;
+    }
+    return true;
+}
+
+/* Writes all cells in their order. While that goes on, the level ends say how far each level has
+ * got. */
+static bool write_all(large *l, mospt_err *err)
+{
+    uint32_t levels = l->env->shape->inner_depth + 2;
+    for (uint32_t i = levels; i-- > 0;)
+        l->node.level_end[i] = i > 0 ? l->node.level_end[i - 1] : 0;
+    return make_all(l, write_cell, err);
+}
+
+static bool make_node(large *l, mospt_err *err)
+{
+    uint32_t index;
+    size_t stride = mospt_record_size(l->env->shape->schema);
+    l->node = (mospt_node){
+        .level = (uint16_t)l->part->level,
+        .child_mask = l->part->child_mask,
+        .corner = {l->part->corner[0], l->part->corner[1], l->part->corner[2]},
+    };
+    if (!divide(l, err) || !make_all(l, note_cell, err) || !sum_up(l, err)) return false;
+    l->node.payload_size = l->node.count * stride;
+    if (!mospt_writer_place(l->env->writer, &l->node, &index, err) || !write_all(l, err) ||
+        !mospt_writer_hash(l->env->writer, &l->node, err))
+        return false;
+    mospt_writer_complete(l->env->writer, index, &l->node, l->points_hash);
+    return l->env->report(l->env->report_context) ||
+           mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
+}
+
+bool prep_large_node(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
+{
+    uint32_t depth = env->shape->inner_depth;
+    large l = {.env = env, .part = part, .shape = *env->shape};
+    l.cut = depth > BELOW_CUT ? depth - BELOW_CUT : 1;
+    if (l.cut > CUT_MAX) l.cut = CUT_MAX;
+    l.shape.inner_depth = depth - l.cut;
+    l.cell_count = 1u << 3 * l.cut;
+    l.cells = calloc(l.cell_count, sizeof *l.cells);
+    if (l.cells == NULL) return mospt_err_nomem(err, l.cell_count * sizeof *l.cells);
+    for (uint32_t c = 0; c < l.cell_count; c++)
+        cell_corner(&l, c, l.cells[c].corner);
+    bool ok = make_node(&l, err);
+    for (uint32_t c = 0; c < l.cell_count; c++)
+        prep_spool_drop(env->store, &l.cells[c].spool);
+    free(l.cells);
+    return ok;
+}
