@@ -14,6 +14,8 @@ enum {
     B = 1 << CLI_BUILD,
     V = 1 << CLI_VIEW,
     S = 1 << CLI_SHOT,
+    R = 1 << CLI_RECORD,
+    J = 1 << CLI_JOIN,
     I = 1 << CLI_INFO,
     C = 1 << CLI_CHECK
 };
@@ -34,6 +36,14 @@ static const struct {
     [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",
                   "Without --eye and --target the picture shows all of the site. The same dataset "
                   "and options give the same bytes.\n"},
+    [CLI_RECORD] =
+        {"record", "NAME.ipts -o FILM.mp4", "make a film of a camera path, without any display",
+         "The name decides: .mp4 H.264, .webm VP9 or AV1, .mkv lossless FFV1, .png numbered "
+         "pictures. Each frame is the\npicture that `shot` makes of it. Without --path the camera "
+         "walks from scan to scan, or turns around the site.\nA recording that was interrupted "
+         "goes on with the same command.\n"},
+    [CLI_JOIN] = {"join", "FILMS... -o FILM.mp4", "put films that were recorded in parts together",
+                  "They must be of the same size and settings; nothing is encoded again.\n"},
     [CLI_INFO] =
         {"info", "NAME.ipts | SCAN", "say what is in a dataset, or in a scan file",
          "Of a scan file: its format, what it holds, and what looks wrong; nothing is built.\n"},
@@ -292,6 +302,124 @@ static bool o_legend(cli_options *o, const char *v)
     return (void)v, o->legend = true;
 }
 
+static bool o_path(cli_options *o, const char *v)
+{
+    return (o->camera_path = v)[0] != '\0';
+}
+static bool o_save_path(cli_options *o, const char *v)
+{
+    return (o->film.save_path = v)[0] != '\0';
+}
+static bool o_codec(cli_options *o, const char *v)
+{
+    return (o->film.codec = v)[0] != '\0';
+}
+static bool o_report(cli_options *o, const char *v)
+{
+    return (o->film.report = v)[0] != '\0';
+}
+static bool o_title(cli_options *o, const char *v)
+{
+    return (o->film.title = v)[0] != '\0' && strlen(v) < 200;
+}
+static bool o_tour(cli_options *o, const char *v)
+{
+    return (void)v, o->film.tour = true;
+}
+static bool o_orbit(cli_options *o, const char *v)
+{
+    return (void)v, o->film.orbit = true;
+}
+static bool o_live(cli_options *o, const char *v)
+{
+    return (void)v, o->film.live = true;
+}
+static bool o_restart(cli_options *o, const char *v)
+{
+    return (void)v, o->film.restart = true;
+}
+static bool o_stereo(cli_options *o, const char *v)
+{
+    return (void)v, o->film.stereo = true;
+}
+static bool o_panorama(cli_options *o, const char *v)
+{
+    return (void)v, o->film.panorama = true;
+}
+static bool o_counter(cli_options *o, const char *v)
+{
+    return (void)v, o->film.counter = true;
+}
+static bool o_duration(cli_options *o, const char *v)
+{
+    return read_real(v, 0.01, 1e6, &o->film.duration_s);
+}
+static bool o_fade(cli_options *o, const char *v)
+{
+    return read_real(v, 0, 1e6, &o->film.fade_s);
+}
+static bool o_eye_distance(cli_options *o, const char *v)
+{
+    return read_real(v, 1e-6, 1e6, &o->film.eye_distance);
+}
+static bool o_shutter(cli_options *o, const char *v)
+{
+    return read_real(v, 0, 1, &o->film.shutter);
+}
+static bool o_subframes(cli_options *o, const char *v)
+{
+    return read_u32(v, 1, 64, &o->film.subframes);
+}
+static bool o_samples(cli_options *o, const char *v)
+{
+    return read_u32(v, 1, 8, &o->film.samples);
+}
+static bool o_quality(cli_options *o, const char *v)
+{
+    return o->film.has_quality = read_u32(v, 0, 63, &o->film.quality);
+}
+
+static bool o_bits(cli_options *o, const char *v)
+{
+    return read_u32(v, 8, 16, &o->film.bits) && o->film.bits % 8 == 0;
+}
+
+static bool o_preset(cli_options *o, const char *v)
+{
+    o->film.preset = v;
+    return strcmp(v, "fast") == 0 || strcmp(v, "medium") == 0 || strcmp(v, "slow") == 0;
+}
+
+/* 30, 29.97 (which means 30000/1001) or a fraction. */
+static bool o_rate(cli_options *o, const char *v)
+{
+    double rate;
+    int used = 0;
+    cli_film_options *f = &o->film;
+    if (sscanf(v, "%u/%u%n", &f->rate_num, &f->rate_den, &used) == 2 && v[used] == '\0')
+        return f->rate_den > 0 && f->rate_num >= f->rate_den && f->rate_num / f->rate_den <= 1000;
+    if (!read_real(v, 1, 1000, &rate)) return false;
+    double whole = ceil(rate);
+    bool television = rate < whole && fabs(rate - whole / 1.001) < 0.006;
+    f->rate_num = television ? (uint32_t)whole * 1000 : (uint32_t)(rate * 1000 + 0.5);
+    f->rate_den = television ? 1001 : 1000;
+    if (!television && f->rate_num % 1000 == 0) f->rate_num /= 1000, f->rate_den = 1;
+    return true;
+}
+
+/* A-B, both counted from 0 and both recorded; A- goes to the end. */
+static bool o_frame_range(cli_options *o, const char *v)
+{
+    char *dash;
+    if (!isdigit((unsigned char)v[0])) return false;
+    o->film.first = strtoull(v, &dash, 10);
+    if (*dash != '-') return false;
+    if (dash[1] == '\0') return true;
+    if (!read_count(dash + 1, o->film.first, UINT32_MAX, &o->film.end)) return false;
+    o->film.end++;
+    return true;
+}
+
 static const struct {
     const char *name, *value; /* value NULL: a switch */
     int letter;               /* 0: none */
@@ -299,64 +427,95 @@ static const struct {
     reader read;
     const char *help;
 } options[] = {
-    {"output", "PATH", 'o', B | V | S, o_output, "where the dataset or the picture goes"},
+    {"output", "PATH", 'o', B | V | S | R | J, o_output,
+     "where the dataset, the picture or the film goes"},
     {"each", NULL, 0, B, o_each,
      "one dataset per scan file, in the folder -o; only what has changed is built"},
     {"force", NULL, 0, B | V, o_force, "replace a dataset that is there"},
-    {"threads", "N", 0, B | V | S, o_threads,
+    {"threads", "N", 0, B | V | S | R, o_threads,
      "threads of the builder (default: one per processor)"},
-    {"memory", "SIZE", 0, B | V | S, o_memory,
+    {"memory", "SIZE", 0, B | V | S | R, o_memory,
      "most memory the build takes, 64M or more (default: a quarter of the machine)"},
-    {"temp-dir", "FOLDER", 0, B | V | S, o_temp_dir,
+    {"temp-dir", "FOLDER", 0, B | V | S | R, o_temp_dir,
      "where scratch files go (default: beside the output)"},
-    {"inner-depth", "N", 0, B | V | S, o_depth,
+    {"inner-depth", "N", 0, B | V | S | R, o_depth,
      "levels of the octree inside each node, 1 to 9 (default: 7)"},
-    {"columns", "NAMES", 0, B | V | S, o_columns,
+    {"columns", "NAMES", 0, B | V | S | R, o_columns,
      "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
-    {"attributes", "NAMES", 0, B | V | S, o_attributes,
+    {"attributes", "NAMES", 0, B | V | S | R, o_attributes,
      "those to keep, as in intensity,classification, or none (default: all)"},
-    {"poses", "FILE", 0, B | V | S | I, o_poses,
+    {"poses", "FILE", 0, B | V | S | R | I, o_poses,
      "moves scans: lines of a file name and a 4 x 4 matrix (NAME.pose.txt beside a scan does it "
      "too)"},
-    {"crop", "BOX", 0, B | V | S | I, o_crop,
+    {"crop", "BOX", 0, B | V | S | R | I, o_crop,
      "keep what is inside X0,Y0,Z0,X1,Y1,Z1; the rest is counted"},
-    {"dedupe", NULL, 0, B | V | S, o_dedupe,
+    {"dedupe", NULL, 0, B | V | S | R, o_dedupe,
      "of points at one position, keep only the first; the rest is counted"},
     {"crs", "TEXT", 0, B | V, o_crs,
      "coordinate reference system to note (default: what the scans say)"},
-    {"budget", "POINTS", 0, V | S, o_budget,
-     "most points drawn in a frame, as in 2M, or all (default: 3M in a window, all in a shot)"},
-    {"min-node-size", "PX", 0, V | S, o_min_node_size,
+    {"budget", "POINTS", 0, V | S | R, o_budget,
+     "most points drawn in a frame, as in 2M, or all (default: 3M in a window, else all)"},
+    {"min-node-size", "PX", 0, V | S | R, o_min_node_size,
      "nodes that are smaller on the screen are not drawn (default: by detail)"},
-    {"point-size", "SIZE", 0, V | S, o_point_size,
+    {"point-size", "SIZE", 0, V | S | R, o_point_size,
      "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
-    {"color", "BY", 0, V | S, o_colour,
+    {"color", "BY", 0, V | S | R, o_colour,
      "rgb (default), intensity, elevation, classification, return, time, scan, density, distance, "
      "or "
      "an attribute"},
-    {"colour", "BY", 0, V | S, o_colour, NULL},
-    {"color-range", "A,B", 0, V | S, o_colour_range,
+    {"colour", "BY", 0, V | S | R, o_colour, NULL},
+    {"color-range", "A,B", 0, V | S | R, o_colour_range,
      "values at both ends of the colours (default: all but the lowest and highest hundredth)"},
-    {"color-map", "NAME", 0, V | S, o_colour_map,
+    {"color-map", "NAME", 0, V | S | R, o_colour_map,
      "viridis, turbo, inferno, grey or diverging (default: grey for intensity, else viridis)"},
-    {"brightness", "FACTOR", 0, V | S, o_brightness, "of RGB colours (default: 1)"},
-    {"gamma", "G", 0, V | S, o_gamma, "of RGB colours; above 1 lifts the dark ones (default: 1)"},
-    {"legend", NULL, 0, S, o_legend, "what the colours mean, in the picture"},
-    {"no-edl", NULL, 0, V | S, o_no_edl, "without eye-dome lighting"},
-    {"size", "WxH", 0, V | S, o_size, "of the picture or window, pixels (default: 1280x720)"},
+    {"brightness", "FACTOR", 0, V | S | R, o_brightness, "of RGB colours (default: 1)"},
+    {"gamma", "G", 0, V | S | R, o_gamma,
+     "of RGB colours; above 1 lifts the dark ones (default: 1)"},
+    {"legend", NULL, 0, S | R, o_legend, "what the colours mean, in the picture"},
+    {"no-edl", NULL, 0, V | S | R, o_no_edl, "without eye-dome lighting"},
+    {"size", "WxH", 0, V | S | R, o_size, "of the picture or window, pixels (default: 1280x720)"},
     {"eye", "X,Y,Z", 0, V | S, o_eye, "where the camera stands, in the coordinates of the scans"},
     {"target", "X,Y,Z", 0, V | S, o_target, "what it looks at"},
     {"up", "X,Y,Z", 0, V | S, o_up, "which way is up: a direction, or x, y, z (default: z)"},
     {"fov", "DEGREES", 0, V | S, o_fov, "vertical field of view, 1 to 170 (default: 60)"},
-    {"ram-cache", "SIZE", 0, V | S, o_ram, "most memory for loaded nodes (default: 1G)"},
-    {"gpu-cache", "SIZE", 0, V | S, o_gpu, "most graphics memory for nodes (default: 1G)"},
+    {"ram-cache", "SIZE", 0, V | S | R, o_ram, "most memory for loaded nodes (default: 1G)"},
+    {"gpu-cache", "SIZE", 0, V | S | R, o_gpu, "most graphics memory for nodes (default: 1G)"},
     {"frames", "N", 0, V, o_frames, "close the window after so many frames"},
     {"screenshot", "PATH", 0, V, o_screenshot, "write the window's picture when it closes"},
+    {"path", "FILE", 0, V | R, o_path,
+     "camera path: keyframes in JSON, a Potree project, or a Bundler file; `view` saves to it"},
+    {"tour", NULL, 0, R, o_tour, "walk from scan position to scan position at eye height"},
+    {"orbit", NULL, 0, R, o_orbit, "turn around the whole site"},
+    {"save-path", "FILE", 0, R, o_save_path,
+     "write the path that is recorded, to change it by hand"},
+    {"duration", "SECONDS", 0, R, o_duration, "stretch the path to this length"},
+    {"fps", "RATE", 0, R, o_rate, "frames a second, as in 30, 29.97 or 24000/1001 (default: 30)"},
+    {"frames", "A-B", 0, R, o_frame_range,
+     "only these frames, counted from 0; whole seconds join best"},
+    {"codec", "NAME", 0, R, o_codec, "h264, av1, vp9 or ffv1, as far as the container takes it"},
+    {"quality", "N", 0, R, o_quality, "0 best to 51 (H.264) or 63 (default: 18 or 28)"},
+    {"preset", "NAME", 0, R, o_preset, "fast, medium or slow: slower makes smaller files"},
+    {"depth", "BITS", 0, R, o_bits, "8 or 16 per channel, for .png and .mkv (default: 8)"},
+    {"samples", "N", 0, R, o_samples,
+     "draw N x N times as large and reduce it, 1 to 8 (default: 1)"},
+    {"shutter", "SHARE", 0, R, o_shutter,
+     "motion blur: how much of a frame's time the shutter is open, 0 to 1 (default: 0)"},
+    {"subframes", "N", 0, R, o_subframes, "pictures while it is open, 1 to 64 (default: 8)"},
+    {"fade", "SECONDS", 0, R, o_fade, "from black at the start and to black at the end"},
+    {"title", "TEXT", 0, R, o_title, "over the first four seconds"},
+    {"counter", NULL, 0, R, o_counter, "frame number and time in a corner"},
+    {"stereo", NULL, 0, R, o_stereo, "two eyes, side by side"},
+    {"eye-distance", "METRES", 0, R, o_eye_distance, "between the two eyes (default: 0.064)"},
+    {"panorama", NULL, 0, R, o_panorama, "all around, equirectangular, 2:1"},
+    {"live", NULL, 0, R, o_live,
+     "as a window would have shown it on this machine, instead of waiting for every point"},
+    {"restart", NULL, 0, R, o_restart, "discard an unfinished recording of something else"},
+    {"report", "FILE", 0, R, o_report, "all frames in JSON: points drawn, budget, camera"},
     {"columns", "NAMES", 0, I, o_columns, NULL},
     {"stats", NULL, 0, I, o_stats, "read every point: extent, means, memory of other structures"},
-    {"json", NULL, 0, B | V | S | I | C, o_json, "the result as JSON on standard output"},
-    {"quiet", NULL, 'q', B | V | S | C, o_quiet, "no progress line"},
-    {"help", NULL, 'h', B | V | S | I | C, o_help, "this page"},
+    {"json", NULL, 0, B | V | S | R | J | I | C, o_json, "the result as JSON on standard output"},
+    {"quiet", NULL, 'q', B | V | S | R | J | C, o_quiet, "no progress line"},
+    {"help", NULL, 'h', B | V | S | R | J | I | C, o_help, "this page"},
 };
 enum { OPTION_COUNT = sizeof options / sizeof options[0] };
 

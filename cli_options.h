@@ -4,7 +4,30 @@
 #include "mospt/err.h"
 #include "render/options.h"
 
-typedef enum { CLI_BUILD, CLI_VIEW, CLI_SHOT, CLI_INFO, CLI_CHECK, CLI_COMMANDS } cli_command;
+typedef enum {
+    CLI_BUILD,
+    CLI_VIEW,
+    CLI_SHOT,
+    CLI_RECORD,
+    CLI_JOIN,
+    CLI_INFO,
+    CLI_CHECK,
+    CLI_COMMANDS
+} cli_command;
+
+/* What `record` alone wants to know. */
+typedef struct {
+    bool tour, orbit, live, restart, stereo, panorama, counter;
+    const char *save_path, *codec, *report, *title;
+    double duration_s, fade_s, eye_distance; /* 0: default */
+    double shutter;                          /* share of a frame's time; 0: no motion blur */
+    uint32_t rate_num, rate_den;             /* frames a second; 0: default */
+    uint64_t first, end;                     /* frames; 0, 0: all */
+    uint32_t bits, samples, subframes;       /* 0: default */
+    bool has_quality;
+    uint32_t quality;
+    const char *preset; /* NULL: default */
+} cli_film_options;
 
 typedef struct {
     cli_command command;
@@ -21,6 +44,8 @@ typedef struct {
     rend_camera_options camera;
     rend_look look;
     rend_limits limits;
+    const char *camera_path; /* file with keyframes */
+    cli_film_options film;
 } cli_options;
 
 /* Reads argv after the subcommand's name.

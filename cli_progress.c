@@ -1,5 +1,6 @@
 #include "cli_progress.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -90,6 +91,20 @@ void cli_progress_share(cli_progress *p, const char *what, uint64_t done, uint64
     char line[128];
     if (!is_due(p)) return;
     snprintf(line, sizeof line, "%-9s %3.0f %%", what, 100 * (double)done / (double)total);
+    show(p, line);
+}
+
+void cli_progress_frames(cli_progress *p, uint64_t done, uint64_t total, uint64_t drawn,
+                         double seconds, uint64_t points)
+{
+    char line[192], left[32] = "";
+    if (!is_due(p)) return;
+    double rate = seconds > 0 ? (double)drawn / seconds : 0;
+    if (rate > 0) time_left((double)(total - done) / rate, left);
+    snprintf(line, sizeof line,
+             "recording %3.0f %%   frame %" PRIu64 " of %" PRIu64
+             "   %.1f frames/s   %.2f M points   %s",
+             100 * (double)done / (double)total, done, total, rate, (double)points / 1e6, left);
     show(p, line);
 }
 

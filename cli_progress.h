@@ -22,6 +22,11 @@ void cli_progress_build(cli_progress *progress, const prep_progress *now);
 /* Shows `done` of `total` of some other job. */
 void cli_progress_share(cli_progress *progress, const char *what, uint64_t done, uint64_t total);
 
+/* Shows a recording: `done` of `total` frames are there, `drawn` of them were drawn in `seconds`.
+ */
+void cli_progress_frames(cli_progress *progress, uint64_t done, uint64_t total, uint64_t drawn,
+                         double seconds, uint64_t points);
+
 /* Clears the line. */
 void cli_progress_end(cli_progress *progress);
 

@@ -1,6 +1,7 @@
 /* main.c - the front door: subcommands, options, exit codes. */
 #include "cli_options.h"
 #include "cli_progress.h"
+#include "cli_record.h"
 #include "cli_report.h"
 
 #include "mospt/check.h"
@@ -340,6 +341,31 @@ static int command_shot(const cli_options *o)
     return ok || (opened && !fits) ? p.code : fail(&err);
 }
 
+static int command_record(const cli_options *o)
+{
+    mospt_err err = {0};
+    place p;
+    rend_record_result result = {0};
+    if (o->path_count == 0) return misuse(o->command, "of what?");
+    if (o->output == NULL) return misuse(o->command, "where to? -o FILM.mp4 says it");
+    bool ok = place_open(o, NULL, &p, &err) && cli_record(o, p.dataset, should_stop, &result, &err);
+    if (ok) {
+        cli_record_report(o, &result);
+        warn_of_damage(result.damaged_nodes, &result.damage);
+        if (result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
+    }
+    place_close(&p);
+    return ok ? p.code : fail(&err);
+}
+
+static int command_join(const cli_options *o)
+{
+    mospt_err err = {0};
+    if (o->path_count == 0) return misuse(o->command, "which films?");
+    if (o->output == NULL) return misuse(o->command, "where to? -o FILM.mp4 says it");
+    return cli_join(o, should_stop, &err) ? EXIT_DONE : fail(&err);
+}
+
 static int command_view(const cli_options *o)
 {
     mospt_err err = {0};
@@ -353,6 +379,7 @@ static int command_view(const cli_options *o)
                                        .limits = o->limits,
                                        .frames = o->frames,
                                        .screenshot = o->screenshot,
+                                       .path = o->camera_path,
                                        .should_stop = should_stop};
     bool opened = place_open(o, o->output, &p, &err), fits = opened && has_colours(o, &p);
     bool ok = fits && rend_view(p.dataset, &options, &result, &err);
@@ -446,8 +473,9 @@ static int help(int argc, char **argv)
 int main(int argc, char **argv)
 {
     static int (*const run[CLI_COMMANDS])(const cli_options *) = {
-        [CLI_BUILD] = command_build, [CLI_VIEW] = command_view,   [CLI_SHOT] = command_shot,
-        [CLI_INFO] = command_info,   [CLI_CHECK] = command_check,
+        [CLI_BUILD] = command_build,   [CLI_VIEW] = command_view, [CLI_SHOT] = command_shot,
+        [CLI_RECORD] = command_record, [CLI_JOIN] = command_join, [CLI_INFO] = command_info,
+        [CLI_CHECK] = command_check,
     };
     cli_command command;
     cli_options options;

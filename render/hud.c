@@ -19,6 +19,8 @@ static const char *const HELP[] = {
     ", .                darker, brighter RGB",
     "L                  eye-dome lighting",
     "P                  save a picture",
+    "T  J               take the view as a keyframe;  play them",
+    "N  X  < >          next keyframe, delete it, move it in time",
     "F                  full screen",
     "H  F1              this help",
     "Esc  ctrl W        quit",

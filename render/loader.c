@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 enum { THREADS_MAX = 16 };
 
@@ -20,6 +21,7 @@ struct rend_loader {
     void *user;
     pthread_t threads[THREADS_MAX];
     uint32_t thread_count;
+    double waited_s; /* the owner's */
 
     /* Guarded by `lock`: all that follows. A node is in at most one of `wanted`, being read, and
      * the finished list: `busy` says of the last two with which paint, by its number from 1, or 0.
@@ -250,15 +252,29 @@ uint32_t rend_loader_take(rend_loader *loader, rend_loaded *out, uint32_t max)
     return count;
 }
 
+static double now_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
 bool rend_loader_wait(rend_loader *loader)
 {
+    double start = now_s();
     pthread_mutex_lock(&loader->lock);
     while (loader->first == NULL &&
            (loader->reading > 0 || loader->next_wanted < loader->wanted_count))
         pthread_cond_wait(&loader->done, &loader->lock);
     bool any = loader->first != NULL;
     pthread_mutex_unlock(&loader->lock);
+    loader->waited_s += now_s() - start;
     return any;
+}
+
+double rend_loader_waited_s(const rend_loader *loader)
+{
+    return loader->waited_s;
 }
 
 uint32_t rend_loader_pending(rend_loader *loader)

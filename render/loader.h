@@ -54,5 +54,8 @@ bool rend_loader_wait(rend_loader *loader);
 /* Nodes asked for, being read, or waiting to be taken. */
 uint32_t rend_loader_pending(rend_loader *loader);
 
+/* Seconds spent in rend_loader_wait() since the start. */
+double rend_loader_waited_s(const rend_loader *loader);
+
 /* Bytes of vertices and attributes read since the start. */
 uint64_t rend_loader_bytes(rend_loader *loader);

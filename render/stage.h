@@ -33,7 +33,8 @@ typedef struct {
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
     uint64_t loaded_bytes;                             /* since the start */
-    uint32_t pending;                                  /* nodes that this view still misses */
+    double waited_s;  /* for the loader, by rend_stage_still(), since the start */
+    uint32_t pending; /* nodes that this view still misses */
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage; /* of the first damaged node; code MOSPT_OK without any */
@@ -60,6 +61,11 @@ typedef enum {
  * waits. */
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
                       mospt_err *err);
+
+/* Says which picture is wanted next: selects for it, and has the loader read what it misses while
+ * the one before is being drawn. Figures are those of the expected picture from now on;
+ * rend_stage_still() of the same view goes on from there. */
+bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *err);
 
 /* Draws all that the budget allows, reading it through the caches in as many parts as they need. */
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err);

@@ -6,6 +6,7 @@
 #include "render/image.h"
 #include "render/orbit.h"
 #include "render/stage.h"
+#include "render/strip.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -38,6 +39,8 @@ typedef struct {
     rend_choice choices[REND_CHOICES_MAX]; /* what colours can show */
     uint32_t choice_count;
     bool help, no_legend, quit, dirty;
+    rend_strip strip;
+    bool budget_changed;
 
     /* A drag in hand. */
     enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN } drag;
@@ -108,8 +111,62 @@ static void start_drag(viewer *v, const rgl_event *e)
         memcpy(v->pivot, v->view.camera.target, sizeof v->pivot);
 }
 
+/* What is seen, as a keyframe: with what was changed since the window opened. */
+static rend_key key_of_view(const viewer *v)
+{
+    const rend_look *look = &v->view.look;
+    rend_key key = {.camera = v->view.camera,
+                    .budget_points = v->budget_changed ? v->view.budget_points : 0};
+    if (!rend_scheme_same(look, &v->options->look))
+        snprintf(key.colour, sizeof key.colour, "%s",
+                 look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute
+                                                       : rend_choice_name(look->colour));
+    return key;
+}
+
+/* colour   NULL or "": as it is */
+static void look_through(viewer *v, const rend_camera *camera, const char *colour)
+{
+    if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
+    v->view.camera = *camera;
+    for (uint32_t i = 0; colour != NULL && i < v->choice_count; i++) {
+        if (strcmp(rend_choice_text(&v->choices[i]), colour) != 0) continue;
+        v->view.look.colour = v->choices[i].colour;
+        v->view.look.attribute = v->choices[i].attribute;
+    }
+    if (v->strip.notice[0] != '\0') tell(v, v->strip.notice);
+    v->strip.notice[0] = '\0';
+    v->dirty = true;
+}
+
+static bool press_strip_key(viewer *v, const rgl_event *e)
+{
+    rend_key key = key_of_view(v);
+    if (!rend_strip_press(&v->strip, e->key, e->shift, rgl_window_seconds(), &key)) return false;
+    look_through(v, &key.camera, key.colour);
+    return true;
+}
+
+/* True if the button is on the strip. */
+static bool grip_strip(viewer *v, const rgl_event *e)
+{
+    rend_key key = key_of_view(v);
+    float line = v->text != NULL ? rgl_text_metrics(v->text).line : TEXT_PX;
+    if (!rend_strip_grip(&v->strip, e->x, e->y, v->view.width, v->view.height, line, &key))
+        return false;
+    look_through(v, &key.camera, key.colour);
+    return true;
+}
+
+static void release_strip(viewer *v)
+{
+    rend_strip_release(&v->strip);
+    look_through(v, &v->view.camera, NULL);
+}
+
 static void move_cursor(viewer *v, const rgl_event *e)
 {
+    if (rend_strip_drag(&v->strip, e->x, v->view.width)) v->dirty = true;
     double dx = e->x - v->cursor[0], dy = e->y - v->cursor[1];
     double turn = TURN_RAD_PER_PX * 720 / v->view.height;
     if (v->drag == DRAG_ORBIT) rend_orbit_turn(&v->view.camera, v->pivot, dx * turn, dy * turn);
@@ -138,6 +195,7 @@ static void scale_budget(viewer *v, double factor)
         v->view.budget_points == REND_ALL ? (double)total : (double)v->view.budget_points;
     budget = fmax(budget * factor, (double)BUDGET_MIN);
     v->view.budget_points = budget >= (double)total && factor > 1 ? REND_ALL : (uint64_t)budget;
+    v->budget_changed = true;
 }
 
 static void scale_points(viewer *v, float step)
@@ -215,6 +273,7 @@ static void press_look_key(viewer *v, int key, bool shift)
 static void press_key(viewer *v, const rgl_event *e)
 {
     v->dirty = true;
+    if (press_strip_key(v, e)) return;
     if (e->key == RGL_KEY_ESCAPE || (e->key == 'W' && e->control)) v->quit = true;
     else if (e->key == 'H' || e->key == RGL_KEY_F1 || e->key == '?') v->help = !v->help;
     else if (e->key == 'R') v->view.camera = v->home;
@@ -234,8 +293,8 @@ static void handle(viewer *v, const rgl_event *e)
         break;
     case RGL_EVENT_BUTTON:
         v->cursor[0] = e->x, v->cursor[1] = e->y;
-        if (e->down) start_drag(v, e);
-        else v->drag = DRAG_NONE;
+        if (!e->down) v->drag = DRAG_NONE, release_strip(v);
+        else if (!grip_strip(v, e)) start_drag(v, e);
         break;
     case RGL_EVENT_MOVE:
         move_cursor(v, e);
@@ -281,6 +340,12 @@ static bool fly(viewer *v)
     return true;
 }
 
+static void play(viewer *v)
+{
+    rend_moment m;
+    if (rend_strip_play(&v->strip, rgl_window_seconds(), &m)) look_through(v, &m.camera, m.colour);
+}
+
 /* ---- frames ---- */
 
 /* A font once it is known how large; a window without words is better than none. */
@@ -312,7 +377,8 @@ static bool draw_words(viewer *v, mospt_err *err)
     else snprintf(look, sizeof look, "%s", colours);
     hud.look = look;
     rend_stage_figures(v->stage, &hud.figures);
-    return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err);
+    return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err) &&
+           rend_strip_draw(&v->strip, v->text, v->view.width, v->view.height, err);
 }
 
 /* What can be drawn in time while the camera moves. */
@@ -411,6 +477,7 @@ static bool run(viewer *v, mospt_err *err)
         while (rgl_window_next(v->window, &event))
             handle(v, &event);
         fly(v);
+        play(v);
         come_to_rest(v);
         if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
             v->notice[0] = '\0', v->dirty = true;
@@ -436,6 +503,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
     v->choice_count = rend_choice_list(&v->dataset->metadata, v->choices);
     v->help = o->help;
     v->dirty = true;
+    if (!rend_strip_init(o->path, &v->strip, err)) return false;
     if (!rend_camera_make(&o->camera, v->dataset, v->view.width, v->view.height, &v->home, err))
         return false;
     v->view.camera = v->home;
@@ -459,6 +527,7 @@ bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
         if (v.result.frames > 0) v.result.mean_ms /= (double)v.result.frames;
         if (result != NULL) *result = v.result;
     }
+    rend_strip_fini(&v.strip);
     rgl_text_destroy(v.text);
     rend_stage_destroy(v.stage);
     rgl_destroy(v.gl);

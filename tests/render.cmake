@@ -10,7 +10,8 @@ target_link_libraries(render_tools PUBLIC rend core_tools)
 set(render_environment
     "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/render_leaks.supp:print_suppressions=0")
 
-foreach(name cache camera loader orbit pages paint ramp scheme select stage)
+foreach(name cache camera curve loader orbit pages paint panorama path path_file ramp rushes scheme select space stage
+    strip)
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE render_tools)
     add_test(NAME ${name} COMMAND test_${name})
@@ -27,6 +28,12 @@ add_executable(e2e_colour e2e_colour.c keep_libraries.c)
 target_link_libraries(e2e_colour PRIVATE render_tools PkgConfig::PNG)
 add_test(NAME e2e_colour COMMAND e2e_colour)
 set_tests_properties(e2e_colour PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+
+# Films, decoded again by FFmpeg's libraries.
+add_executable(e2e_record e2e_record.c keep_libraries.c ref_film.c)
+target_link_libraries(e2e_record PRIVATE render_tools PkgConfig::PNG PkgConfig::LIBAV)
+add_test(NAME e2e_record COMMAND e2e_record)
+set_tests_properties(e2e_record PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
 
 # A window, where there is a display to be had without one.
 find_program(XVFB_RUN xvfb-run)

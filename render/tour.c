@@ -1,0 +1,294 @@
+#include "render/tour.h"
+
+#include "render/space.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { ORBIT_KEYS = 36, PLACES_MAX = 7 };
+#define PI 3.14159265358979323846
+#define FOV_RAD (60 * PI / 180)
+#define ORBIT_S 30.0
+#define EYE_M 1.65
+#define WALK_M_PER_S 1.4
+#define LONGEST_S 300.0
+#define SAME_PLACE_M 0.5 /* scans of one setup */
+#define SMOOTH_M 1.5     /* corners are cut this much */
+#define KEY_M 2.5        /* between two keyframes */
+#define LOOK_AHEAD_M 5.0
+#define PLACES_APART_M 4.0
+
+static double distance3(const double a[3], const double b[3])
+{
+    return sqrt(pow(a[0] - b[0], 2) + pow(a[1] - b[1], 2) + pow(a[2] - b[2], 2));
+}
+
+/* ---- around ---- */
+
+static void turn_about(const double middle[3], const double from[3], double turn, double to[3])
+{
+    double x = from[0] - middle[0], y = from[1] - middle[1];
+    to[0] = middle[0] + x * cos(turn) - y * sin(turn);
+    to[1] = middle[1] + x * sin(turn) + y * cos(turn);
+    to[2] = from[2];
+}
+
+/* True if no corner of the site is outside of the picture. */
+static bool shows_all(const rend_camera *camera, const double low[3], const double high[3],
+                      double aspect)
+{
+    double right[3], up[3], back[3], t = tan(0.5 * camera->fov_rad);
+    rend_camera_axes(camera, right, up, back);
+    for (int corner = 0; corner < 8; corner++) {
+        double x = 0, y = 0, z = 0;
+        for (int a = 0; a < 3; a++) {
+            double d = ((corner >> a & 1) ? high[a] : low[a]) - camera->eye[a];
+            x += d * right[a], y += d * up[a], z -= d * back[a];
+        }
+        if (!(z > 0 && fabs(x) <= t * aspect * z && fabs(y) <= t * z)) return false;
+    }
+    return true;
+}
+
+/* Around a square of so many metres; `fits` tells whether the site stays in the picture. */
+static bool circle(const double low[3], const double high[3], double side, double aspect,
+                   rend_path *path, bool *fits, mospt_err *err)
+{
+    double middle[3], square_low[3], square_high[3];
+    rend_camera view;
+    for (int a = 0; a < 3; a++) {
+        middle[a] = low[a] + 0.5 * (high[a] - low[a]);
+        square_low[a] = a < 2 ? middle[a] - 0.5 * side : low[a];
+        square_high[a] = a < 2 ? middle[a] + 0.5 * side : high[a];
+    }
+    rend_camera_overview(square_low, square_high, aspect, FOV_RAD, &view);
+    *fits = true;
+    for (int i = 0; i <= ORBIT_KEYS; i++) {
+        double turn = 2 * PI * i / ORBIT_KEYS;
+        rend_key key = {.time_s = ORBIT_S * i / ORBIT_KEYS,
+                        .camera = {.up = {0, 0, 1}, .fov_rad = FOV_RAD}};
+        turn_about(middle, view.eye, turn, key.camera.eye);
+        turn_about(middle, view.target, turn, key.camera.target);
+        *fits = *fits && shows_all(&key.camera, low, high, aspect);
+        if (!rend_path_add(path, &key, NULL, err)) return false;
+    }
+    return true;
+}
+
+/* As near as possible: from a circle around the circumscribed one everything shows. */
+bool rend_tour_orbit(const mospt_dataset *dataset, double aspect, rend_path *out, mospt_err *err)
+{
+    double low[3], high[3];
+    rend_path path = {0};
+    bool fits = false;
+    rend_camera_bounds(dataset, low, high);
+    double x = high[0] - low[0], y = high[1] - low[1];
+    double nearest = fmax(fmax(x, y), 16 * dataset->metadata.grid.step);
+    for (double side = nearest; !fits && side < 2 * nearest; side *= 1.05) {
+        rend_path_fini(&path);
+        if (!circle(low, high, side, aspect, &path, &fits, err)) {
+            rend_path_fini(&path);
+            return false;
+        }
+    }
+    *out = path;
+    return true;
+}
+
+/* ---- places to walk to ---- */
+
+typedef struct {
+    double (*at)[3]; /* [count], owned */
+    size_t count, capacity;
+} places;
+
+static bool add_place(places *p, const double at[3], mospt_err *err)
+{
+    if (p->count == p->capacity) {
+        size_t capacity = p->capacity > 0 ? 2 * p->capacity : 256;
+        void *larger = realloc(p->at, capacity * sizeof *p->at);
+        if (larger == NULL) return mospt_err_nomem(err, capacity * sizeof *p->at);
+        p->at = larger, p->capacity = capacity;
+    }
+    memcpy(p->at[p->count++], at, sizeof *p->at);
+    return true;
+}
+
+/* Where the scanner stood, in the order of the scans. */
+static bool find_scan_positions(const mospt_dataset *dataset, places *out, mospt_err *err)
+{
+    const mospt_metadata *m = &dataset->metadata;
+    for (uint32_t i = 0; i < m->source_count; i++) {
+        const double *pose = m->sources[i].pose;
+        const double at[3] = {pose[3], pose[7], pose[11]};
+        bool inside = m->sources[i].has_pose;
+        for (int a = 0; a < 3; a++)
+            inside = inside && at[a] >= m->low[a] && at[a] <= m->high[a];
+        for (size_t j = 0; inside && j < out->count; j++)
+            inside = distance3(out->at[j], at) > SAME_PLACE_M;
+        if (inside && !add_place(out, at, err)) return false;
+    }
+    return true;
+}
+
+/* Free cells at eye height that nothing is near to. */
+static bool find_free_places(const rend_space *space, places *out, mospt_err *err)
+{
+    for (size_t c = 0; c < rend_space_cells(space); c++) {
+        double at[3];
+        if (rend_space_cost(space, c, EYE_M) > 1) continue;
+        rend_space_middle(space, c, at);
+        if (!add_place(out, at, err)) return false;
+    }
+    return true;
+}
+
+/* Keeps a few places far from each other: each the farthest from those before. */
+static void thin_out(places *p)
+{
+    size_t kept = 1, middle = p->count / 2;
+    if (p->count == 0) return;
+    for (int a = 0; a < 3; a++) {
+        double swapped = p->at[0][a];
+        p->at[0][a] = p->at[middle][a], p->at[middle][a] = swapped;
+    }
+    while (kept < PLACES_MAX) {
+        size_t farthest = 0;
+        double most = PLACES_APART_M;
+        for (size_t i = kept; i < p->count; i++) {
+            double nearest = INFINITY;
+            for (size_t k = 0; k < kept; k++)
+                nearest = fmin(nearest, distance3(p->at[i], p->at[k]));
+            if (nearest > most) most = nearest, farthest = i;
+        }
+        if (farthest == 0) break;
+        for (int a = 0; a < 3; a++) {
+            double swapped = p->at[kept][a];
+            p->at[kept][a] = p->at[farthest][a], p->at[farthest][a] = swapped;
+        }
+        kept++;
+    }
+    p->count = kept;
+}
+
+/* From each place on to the nearest that is left. */
+static void order(places *p)
+{
+    for (size_t i = 0; i + 2 < p->count; i++) {
+        size_t nearest = i + 1;
+        for (size_t j = i + 2; j < p->count; j++)
+            if (distance3(p->at[i], p->at[j]) < distance3(p->at[i], p->at[nearest])) nearest = j;
+        for (int a = 0; a < 3; a++) {
+            double swapped = p->at[i + 1][a];
+            p->at[i + 1][a] = p->at[nearest][a], p->at[nearest][a] = swapped;
+        }
+    }
+}
+
+/* ---- the walk ---- */
+
+/* Appends the way from place to place, cell by cell. */
+static bool walk(const rend_space *space, const places *stops, places *way, mospt_err *err)
+{
+    for (size_t i = 0; i + 1 < stops->count; i++) {
+        size_t *cells = NULL, count = 0, from = rend_space_cell(space, stops->at[i]),
+               to = rend_space_cell(space, stops->at[i + 1]);
+        bool ok = rend_space_route(space, from, to, EYE_M, &cells, &count, err);
+        for (size_t c = i > 0; ok && c < count; c++) {
+            double at[3];
+            rend_space_middle(space, cells[c], at);
+            ok = add_place(way, at, err);
+        }
+        free(cells);
+        if (!ok) return false;
+    }
+    return true;
+}
+
+/* Cells make a zigzag: each point becomes the mean of those around it, fewer towards the ends. */
+static bool smooth(const rend_space *space, places *way, mospt_err *err)
+{
+    size_t reach = (size_t)(SMOOTH_M / space->cell_m) + 1;
+    double(*means)[3] = calloc(way->count, sizeof *means);
+    if (means == NULL) return mospt_err_nomem(err, way->count * sizeof *means);
+    for (size_t i = 0; i < way->count; i++) {
+        size_t r = reach;
+        if (i < r) r = i;
+        if (way->count - 1 - i < r) r = way->count - 1 - i;
+        for (size_t j = i - r; j <= i + r; j++)
+            for (int a = 0; a < 3; a++)
+                means[i][a] += way->at[j][a] / (double)(2 * r + 1);
+    }
+    free(way->at);
+    way->at = means;
+    way->capacity = way->count;
+    return true;
+}
+
+/* The point so many metres further on, or the last one. */
+static size_t ahead(const places *way, size_t from, double metres)
+{
+    double gone = 0;
+    size_t i = from;
+    for (; i + 1 < way->count && gone < metres; i++)
+        gone += distance3(way->at[i], way->at[i + 1]);
+    return i;
+}
+
+static bool make_keys(const places *way, rend_path *path, mospt_err *err)
+{
+    double gone = 0, towards[3] = {1, 0, 0};
+    for (size_t i = 0, next; i < way->count; i = next) {
+        rend_key key = {.time_s = gone / WALK_M_PER_S,
+                        .camera = {.up = {0, 0, 1}, .fov_rad = FOV_RAD}};
+        size_t look = ahead(way, i, LOOK_AHEAD_M);
+        for (int a = 0; a < 3; a++)
+            key.camera.eye[a] = way->at[i][a];
+        /* Towards the end there is nothing ahead: keep looking that way. The gaze is level enough
+         * to see where the way goes on. */
+        if (distance3(way->at[i], way->at[look]) > LOOK_AHEAD_M / 2)
+            for (int a = 0; a < 3; a++)
+                towards[a] = (way->at[look][a] - way->at[i][a]) * (a == 2 ? 0.5 : 1);
+        for (int a = 0; a < 3; a++)
+            key.camera.target[a] = key.camera.eye[a] + towards[a];
+        if (!rend_path_add(path, &key, NULL, err)) return false;
+        next = ahead(way, i, KEY_M);
+        if (next == i) break;
+        for (size_t j = i; j < next; j++)
+            gone += distance3(way->at[j], way->at[j + 1]);
+    }
+    if (rend_path_duration(path) > LONGEST_S) rend_path_fit(path, LONGEST_S);
+    return true;
+}
+
+static bool make_walk(const mospt_dataset *dataset, const rend_space *space, rend_path *path,
+                      mospt_err *err)
+{
+    places stops = {0}, way = {0};
+    bool ok = find_scan_positions(dataset, &stops, err);
+    if (ok && stops.count < 2) {
+        stops.count = 0;
+        ok = find_free_places(space, &stops, err);
+        if (ok) thin_out(&stops), order(&stops);
+    }
+    if (ok && stops.count < 2)
+        ok = mospt_err_set(
+            err, MOSPT_EINVAL, mospt_nowhere(),
+            "there is no free way to walk through this site; --orbit turns around it");
+    ok = ok && walk(space, &stops, &way, err) && smooth(space, &way, err) &&
+         make_keys(&way, path, err);
+    free(stops.at), free(way.at);
+    return ok;
+}
+
+bool rend_tour_walk(const mospt_dataset *dataset, rend_path *out, mospt_err *err)
+{
+    rend_space space = {0};
+    rend_path path = {0};
+    bool ok = rend_space_make(dataset, &space, err) && make_walk(dataset, &space, &path, err);
+    rend_space_fini(&space);
+    if (ok) *out = path;
+    else rend_path_fini(&path);
+    return ok;
+}
