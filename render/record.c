@@ -333,6 +333,7 @@ static bool draw_all(recorder *r, mospt_err *err)
     if (!o->live && !rend_scout_start(r->dataset, r->take, r->curve, seconds_per_frame(r), next,
                                       r->options.end, &r->scout, err))
         return false;
+    r->result.starting_s = now_s() - r->start_s;
     bool drawn = o->live ? record_live(r, size, err) : record_converged(r, err);
     rend_scout_destroy(r->scout);
     mospt_err write_err = {0};

@@ -42,6 +42,7 @@ typedef struct {
     uint64_t frames, drawn; /* of the film; in this run */
     uint64_t resumed_at;    /* first frame of this run */
     double seconds;
+    double starting_s;     /* of them before the first frame: graphics driver, caches */
     rend_take_times spent; /* seconds of each stage in this run */
     double encoding_s;
     uint64_t points_most; /* in a frame of this run */

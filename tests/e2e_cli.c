@@ -177,6 +177,19 @@ static void wrong_use_is_exit_code_2_and_one_sentence(void **state)
         "info --force x",
         "check",
         "check a b",
+        "record",
+        "record a.las",
+        "record a.las -o a.mp4 --frames 5-3",
+        "record a.las -o a.mp4 --frames 5",
+        "record a.las -o a.mp4 --fps 0",
+        "record a.las -o a.mp4 --fps 30/0",
+        "record a.las -o a.mp4 --samples 9",
+        "record a.las -o a.mp4 --depth 12",
+        "record a.las -o a.mp4 --preset best",
+        "record a.las -o a.mp4 --shutter 2",
+        "join a.mp4",
+        "join -o a.mp4",
+        "shot a.las -o a.png --frames 0-3",
         "help nonsense",
         "check --memory 1G x",
         "-x",
@@ -229,7 +242,7 @@ static void help_goes_to_standard_output(void **state)
     static const char *const pages[] = {"help",         "--help",     "-h",          "help build",
                                         "build --help", "build -h",   "info --help", "check --help",
                                         "help info",    "help check", "help shot",   "help view",
-                                        "--version"};
+                                        "help record",  "help join",  "--version"};
     (void)state;
     for (size_t k = 0; k < sizeof pages / sizeof pages[0]; k++) {
         expect(pages[k], DONE);
