@@ -1,6 +1,7 @@
 #include "render/hud.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -94,17 +95,18 @@ static bool warning_line(const rend_hud *hud, char line[LINE_MAX])
 static void help_box(labels *l, const rgl_text *text, uint32_t width, uint32_t height)
 {
     rgl_metrics m = rgl_text_metrics(text);
-    float advance = m.advance, line = m.line, pad = line;
+    float advance = m.advance, line = m.line, pad = line, bar = line + 2 * line / 3;
+    /* A low window has it closer, below the line of figures. */
+    float room = ((float)height - bar - 2 * pad) / HELP_COUNT;
+    float spacing = fminf(1.1f * line, fmaxf(room, 0.8f * line));
     size_t longest = 0;
     for (int i = 0; i < HELP_COUNT; i++)
         if (strlen(HELP[i]) > longest) longest = strlen(HELP[i]);
-    float w = (float)longest * advance + 2 * pad, h = HELP_COUNT * line * 1.1f + 2 * pad;
-    float x = ((float)width - w) / 2, y = ((float)height - h) / 2;
-    if (x < 0) x = 0;
-    if (y < 0) y = 0;
+    float w = (float)longest * advance + 2 * pad, h = HELP_COUNT * spacing + 2 * pad;
+    float x = fmaxf(((float)width - w) / 2, 0), y = fmaxf(((float)height - h) / 2, bar);
     panel(l, x, y, w, h);
     for (int i = 0; i < HELP_COUNT; i++)
-        words(l, x + pad, y + pad + (float)i * line * 1.1f, WHITE, HELP[i]);
+        words(l, x + pad, y + pad + (float)i * spacing, WHITE, HELP[i]);
 }
 
 bool rend_hud_draw(rgl_text *text, const rend_hud *hud, uint32_t width, uint32_t height,
