@@ -6,6 +6,7 @@
 #include "render/rushes.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -126,11 +127,21 @@ static void forget_segment(rend_reel *r)
     r->encoder = NULL, r->rushes = NULL, r->film = r->raw = NULL;
 }
 
+/* Its name says that a segment is whole: that must hold after a power cut, too. */
+static bool flush(const char *path, mospt_err *err)
+{
+    int fd = open(path, O_RDWR | O_CLOEXEC);
+    bool ok = fd >= 0 && fsync(fd) == 0;
+    if (!ok) mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be written");
+    if (fd >= 0) close(fd);
+    return ok;
+}
+
 static bool end_segment(rend_reel *r, mospt_err *err)
 {
     char *name = segment_name(r, segment_of(r, r->next - 1));
     bool ok = name != NULL || mospt_err_nomem(err, 0);
-    ok = ok && rfilm_encoder_finish(r->encoder, err);
+    ok = ok && rfilm_encoder_finish(r->encoder, err) && flush(r->film, err);
     ok = ok && (rename(r->film, name) == 0 ||
                 mospt_err_set(err, MOSPT_EIO, mospt_at_file(name), "cannot be written"));
     if (ok) unlink(r->raw);
