@@ -185,8 +185,7 @@ static bool write_run(large *l, const cell *c, const uint8_t *payload, uint32_t 
     size_t of_cell = c->spool.count, of_node = l->node.count, before = 0;
     for (uint32_t k = 0; k <= schema->count; k++) {
         const mospt_attribute *a = k > 0 ? &schema->at[k - 1] : NULL;
-        size_t size =
-            a != NULL ? mospt_type_size(a->type) * a->components : sizeof(mospt_vertex);
+        size_t size = a != NULL ? mospt_type_size(a->type) * a->components : sizeof(mospt_vertex);
         if (!mospt_writer_write_part(l->env->writer, &l->node, before * of_node + to * size,
                                      payload + before * of_cell + begin * size,
                                      (end - begin) * size, err))
