@@ -1,17 +1,27 @@
 #include "mospt/linear.h"
 
-enum { FEW = 64 }; /* points in one cell, for a plain sort */
+enum {
+    FEW = 64,   /* points in one cell, for a plain sort */
+    AHEAD = 64, /* keys by which the memory that they point to is asked for early */
+    STANDING_MAX = 1 + (MOSPT_CHILDREN_MAX - 1) * MOSPT_DEPTH_MAX,
+};
 
-/* The points that stand for the cells of the present depth. */
+/* Work in progress. A point stands for the cells around it: of all depths but those that it shares
+ * with the one before it. Those in cells that have not ended stand in a stack. */
 typedef struct {
-    uint32_t *place; /* of the point in the keys */
-    uint32_t *colour;
-    uint8_t *boundary; /* coarsest depth at which it is in another cell than the one before it */
-} standing;
+    const mospt_linear_input *in;
+    uint8_t *level;                /* [count] of the points that no longer stand */
+    uint32_t at[MOSPT_LEVELS_MAX]; /* how many of them are in each level */
+    uint32_t place[STANDING_MAX];  /* in the keys */
+    uint32_t colour[STANDING_MAX];
+    uint32_t boundary[STANDING_MAX]; /* coarsest depth at which it is in another cell than the one
+                                        before it; they rise */
+    uint32_t top;                    /* index of the last one */
+} linear;
 
 size_t mospt_linear_work_size(uint32_t count)
 {
-    return (size_t)count * (2 * sizeof(uint32_t) + 2);
+    return count;
 }
 
 static const uint8_t *record_of(const mospt_linear_input *in, uint64_t key)
@@ -97,37 +107,17 @@ static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t cou
         sort_cell(in, keys + begin[v], begin[v + 1] - begin[v], at + 1);
 }
 
-/* The order in which points arrived must not show in the result: only their bytes order the points
- * of one cell. */
-static void sort_shared_cells(const mospt_linear_input *in, uint64_t *keys, uint32_t count)
+/* Coarsest depth at which two finest cells part: 1 for other octants of the node. */
+static uint32_t parting_depth(uint64_t a, uint64_t b, uint32_t depth)
 {
-    for (uint32_t a = 0, b; a < count; a = b) {
-        uint64_t cell = keys[a] >> in->cell_shift;
-        for (b = a + 1; b < count && keys[b] >> in->cell_shift == cell;)
-            b++;
-        if (b - a > 1) sort_cell(in, keys + a, b - a, 0);
-    }
+    return depth - (63 - (uint32_t)__builtin_clzll(a ^ b)) / 3;
 }
 
-/* Depth at which two cells of the finest depth part: 0 for other octants of the node, `depth` + 1
- * for the same cell. */
-static uint8_t parting_depth(uint64_t a, uint64_t b, uint32_t depth)
+static uint32_t colour_of(const mospt_linear_input *in, uint64_t key)
 {
-    uint64_t differ = a ^ b;
-    if (differ == 0) return (uint8_t)(depth + 1);
-    return (uint8_t)(depth - (63 - (uint32_t)__builtin_clzll(differ)) / 3);
-}
-
-static void stand_all(const mospt_linear_input *in, const uint64_t *keys, uint32_t count,
-                      standing *s)
-{
-    for (uint32_t i = 0; i < count; i++) {
-        s->place[i] = i;
-        s->colour[i] = in->colours[mospt_linear_index(keys[i], in->index_bits)];
-        s->boundary[i] = i == 0 ? 0
-                                : parting_depth(keys[i] >> in->cell_shift,
-                                                keys[i - 1] >> in->cell_shift, in->depth);
-    }
+    uint32_t colour;
+    memcpy(&colour, record_of(in, key) + offsetof(mospt_vertex, r), sizeof colour);
+    return colour;
 }
 
 static int32_t channel(uint32_t colour, int c)
@@ -139,30 +129,12 @@ static int32_t channel(uint32_t colour, int c)
 
 /* Section 4.6: of the points standing for the children of a cell, the one whose colour is nearest
  * to their average; the first of several. Distances are compared as |n c - sum|^2, in integers, so
- * that every machine decides alike. */
-static uint32_t choose_of_many(const uint32_t *colours, uint32_t n)
-{
-    int64_t sum[3] = {0}, best_distance = INT64_MAX;
-    uint32_t best = 0;
-    for (uint32_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++)
-            sum[c] += channel(colours[i], c);
-    for (uint32_t i = 0; i < n; i++) {
-        int64_t distance = 0;
-        for (int c = 0; c < 3; c++) {
-            int64_t d = (int64_t)n * channel(colours[i], c) - sum[c];
-            distance += d * d;
-        }
-        if (distance < best_distance) best_distance = distance, best = i;
-    }
-    return best;
-}
-
-/* For eight points 32 bits do. */
+ * that every machine decides alike. Two are always at the same distance. */
 uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t n)
 {
     int32_t sum[3] = {0}, best_distance = INT32_MAX, count = (int32_t)n;
     uint32_t best = 0;
+    if (n <= 2) return 0;
     for (uint32_t i = 0; i < n; i++)
         for (int c = 0; c < 3; c++)
             sum[c] += channel(colours[i], c);
@@ -171,53 +143,106 @@ uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t n)
                 dg = count * channel(colours[i], 1) - sum[1],
                 db = count * channel(colours[i], 2) - sum[2];
         int32_t distance = dr * dr + dg * dg + db * db;
+        best = distance < best_distance ? i : best;
+        best_distance = distance < best_distance ? distance : best_distance;
+    }
+    return best;
+}
+
+/* The same for any number of points in a finest cell, where 32 bits would not do. */
+static uint32_t choose_key(const mospt_linear_input *in, const uint64_t *keys, uint32_t n)
+{
+    int64_t sum[3] = {0}, best_distance = INT64_MAX;
+    uint32_t best = 0;
+    if (n <= 2) return 0;
+    for (uint32_t i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += channel(colour_of(in, keys[i]), c);
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t distance = 0;
+        for (int c = 0; c < 3; c++) {
+            int64_t d = (int64_t)n * channel(colour_of(in, keys[i]), c) - sum[c];
+            distance += d * d;
+        }
         if (distance < best_distance) best_distance = distance, best = i;
     }
     return best;
 }
 
-/* Leaves one of the points in each cell of `depth` standing, and gives them that level. Returns how
- * many. */
-static uint32_t rise(standing *s, uint32_t count, uint32_t depth, uint8_t *level)
+static void settle(linear *l, uint32_t place, uint32_t level)
 {
-    uint32_t out = 0;
-    for (uint32_t a = 0, b; a < count; a = b) {
-        for (b = a + 1; b < count && s->boundary[b] > depth;)
-            b++;
-        uint32_t chosen = a;
-        if (b - a > 1 && b - a <= MOSPT_CHILDREN_MAX)
-            chosen += mospt_linear_choose(s->colour + a, b - a);
-        else if (b - a > 1) chosen += choose_of_many(s->colour + a, b - a);
-        level[s->place[chosen]] = (uint8_t)depth;
-        s->place[out] = s->place[chosen];
-        s->colour[out] = s->colour[chosen];
-        s->boundary[out++] = s->boundary[a];
+    l->level[place] = (uint8_t)level;
+    l->at[level]++;
+}
+
+/* Ends all cells of depth `boundary` and below: of the children of each, finest first, one goes on
+ * to stand for it, and the others are settled in the level that they stood in. */
+static void end_cells(linear *l, uint32_t boundary)
+{
+    while (l->boundary[l->top] > boundary) {
+        uint32_t level = l->boundary[l->top], first = l->top;
+        do
+            first--;
+        while (l->boundary[first] == level);
+        uint32_t n = l->top - first + 1, chosen = mospt_linear_choose(l->colour + first, n);
+        for (uint32_t i = 0; i < n; i++)
+            if (i != chosen) settle(l, l->place[first + i], level);
+        l->place[first] = l->place[first + chosen];
+        l->colour[first] = l->colour[first + chosen];
+        l->top = first;
     }
-    return out;
+}
+
+/* The points of one finest cell: one of them stands for it. Returns which. The order in which they
+ * arrived must not show in the result, so only their bytes order them. */
+static uint32_t enter_cell(linear *l, uint64_t *keys, uint32_t begin, uint32_t end)
+{
+    if (end - begin == 1) return begin;
+    sort_cell(l->in, keys + begin, end - begin, 0);
+    uint32_t chosen = begin + choose_key(l->in, keys + begin, end - begin);
+    for (uint32_t i = begin; i < end; i++)
+        if (i != chosen) settle(l, i, l->in->depth + 1);
+    return chosen;
+}
+
+/* Gives every point its level, in one walk along the Morton order. */
+static void assign_levels(linear *l, uint64_t *keys, uint32_t count)
+{
+    const mospt_linear_input *in = l->in;
+    uint64_t last = 0; /* cell */
+    uint32_t asked = 0;
+    for (uint32_t a = 0, b; a < count; a = b) {
+        uint64_t cell = keys[a] >> in->cell_shift;
+        for (b = a + 1; b < count && keys[b] >> in->cell_shift == cell;)
+            b++;
+        uint32_t ask = count - b < AHEAD ? count : b + AHEAD;
+        for (; asked < ask; asked++)
+            __builtin_prefetch(record_of(in, keys[asked]));
+        uint32_t place = enter_cell(l, keys, a, b), boundary = 0;
+        if (a > 0) {
+            boundary = parting_depth(cell, last, in->depth);
+            end_cells(l, boundary);
+            l->top++;
+        }
+        l->place[l->top] = place;
+        l->colour[l->top] = colour_of(in, keys[place]);
+        l->boundary[l->top] = boundary;
+        last = cell;
+    }
+    end_cells(l, 0);
+    settle(l, l->place[0], 0);
 }
 
 void mospt_linear_build(const mospt_linear_input *in, uint64_t *keys, uint32_t count, void *work,
                         uint32_t *order, uint32_t *level_end)
 {
-    standing s = {.place = work};
-    s.colour = s.place + count;
-    s.boundary = (uint8_t *)(s.colour + count);
-    uint8_t *level = s.boundary + count;
-    uint32_t at[MOSPT_LEVELS_MAX] = {0}, standing_count = count;
-
-    sort_shared_cells(in, keys, count);
-    stand_all(in, keys, count, &s);
-    memset(level, (int)in->depth + 1, count);
-    for (uint32_t depth = in->depth + 1; depth-- > 0;)
-        standing_count = rise(&s, standing_count, depth, level);
-
-    for (uint32_t i = 0; i < count; i++)
-        at[level[i]]++;
-    for (uint32_t l = 0, end = 0; l < in->depth + 2; l++) {
-        uint32_t here = at[l];
-        at[l] = end;
-        level_end[l] = end += here;
+    linear l = {.in = in, .level = work};
+    uint32_t next[MOSPT_LEVELS_MAX] = {0};
+    if (count > 0) assign_levels(&l, keys, count);
+    for (uint32_t level = 0, end = 0; level < in->depth + 2; level++) {
+        next[level] = end;
+        level_end[level] = end += l.at[level];
     }
     for (uint32_t i = 0; i < count; i++)
-        order[at[level[i]]++] = mospt_linear_index(keys[i], in->index_bits);
+        order[next[l.level[i]]++] = mospt_linear_index(keys[i], in->index_bits);
 }

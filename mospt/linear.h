@@ -13,10 +13,8 @@
  * record in the lower `index_bits`. */
 typedef struct {
     const mospt_records *records; /* borrowed; all of a record orders points in one cell */
-    const uint32_t *colours; /* borrowed, one per record: r, g, b, i of its vertex as they stand
-                                in memory */
-    uint32_t depth;          /* of the inner octree, MOSPT_DEPTH_MIN to MOSPT_DEPTH_MAX */
-    uint32_t index_bits;     /* 0 to 32 */
+    uint32_t depth;               /* of the inner octree, MOSPT_DEPTH_MIN to MOSPT_DEPTH_MAX */
+    uint32_t index_bits;          /* 0 to 32 */
     uint32_t cell_shift; /* bits of a key below that depth, the index included: the cell of a key is
                             key >> cell_shift */
 } mospt_linear_input;

@@ -22,7 +22,7 @@ void prep_subtree_fini(prep_subtree *subtree)
 
 size_t prep_solve_work_size(uint32_t count)
 {
-    return count * (2 * sizeof(uint64_t) + sizeof(uint32_t));
+    return count * 2 * sizeof(uint64_t);
 }
 
 static void solver_init(solver *s, const prep_shape *shape, const mospt_records *records,
@@ -30,8 +30,7 @@ static void solver_init(solver *s, const prep_shape *shape, const mospt_records 
 {
     *s = (solver){.shape = shape, .keys = work, .made.count = count};
     s->made.keys = s->keys + count;
-    s->made.colours = (uint32_t *)(s->made.keys + count);
-    s->sorter = (prep_sorter){.grid = shape->grid, .records = records, .colours = s->made.colours};
+    s->sorter = (prep_sorter){.grid = shape->grid, .records = records};
     prep_sort_begin(&s->sorter, s->keys, count);
     s->made.index_bits = s->sorter.index_bits;
 }
@@ -250,7 +249,6 @@ uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
     uint8_t *payload = memory;
     uint32_t *order = (uint32_t *)(payload + payload_room(shape, count));
     mospt_linear_input input = {.records = records,
-                                .colours = subtree->colours,
                                 .depth = shape->inner_depth,
                                 .index_bits = subtree->index_bits,
                                 .cell_shift = solved->cell_shift};

@@ -35,9 +35,8 @@ typedef struct {
     prep_solved *nodes; /* [node_count], owned */
     uint32_t node_count, node_capacity;
     uint32_t count, index_bits;
-    uint64_t *keys;    /* [count], borrowed, in the caller's working memory: those of each node by
-                          rising cell */
-    uint32_t *colours; /* [count], likewise: of the records */
+    uint64_t *keys; /* [count], borrowed, in the caller's working memory: those of each node by
+                       rising cell */
 } prep_subtree;
 
 void prep_subtree_fini(prep_subtree *subtree);

@@ -86,7 +86,6 @@ void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint6
                 mospt_records_at(s->records, mospt_linear_index(keys[i + AHEAD], s->index_bits)));
         mospt_vertex v = mospt_vertex_of(mospt_records_at(s->records, index));
         keys[i] = mospt_cell_code(v.x, v.y, v.z, bits, s->code_levels) << s->index_bits | index;
-        if (s->colours != NULL) memcpy(&s->colours[index], &v.r, sizeof s->colours[index]);
     }
     prep_sort_keys(keys, spare, count, s->index_bits);
 }

@@ -9,10 +9,8 @@
 typedef struct {
     const mospt_grid *grid;       /* borrowed */
     const mospt_records *records; /* borrowed */
-    uint32_t *colours;    /* borrowed: gets those of the records, for mospt_linear_input; NULL: not
-                             wanted */
-    uint32_t index_bits;  /* of a key */
-    uint32_t code_levels; /* of a key, above the index */
+    uint32_t index_bits;          /* of a key */
+    uint32_t code_levels;         /* of a key, above the index */
 } prep_sorter;
 
 /* Chooses index_bits and code_levels for so many records, and sets keys to their indices.

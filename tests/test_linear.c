@@ -25,21 +25,18 @@ static built build(const core_site *site, uint32_t depth, uint32_t code_levels)
     const uint8_t *blocks[] = {site->records};
     const mospt_records records = {
         .blocks = blocks, .stride = site->stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
-    uint32_t *colours = malloc((n + 1) * sizeof *colours);
     const mospt_linear_input input = {.records = &records,
-                                      .colours = colours,
                                       .depth = depth,
                                       .index_bits = INDEX_BITS,
                                       .cell_shift = INDEX_BITS + 3 * (code_levels - depth)};
-    assert_true(b.order != NULL && keys != NULL && work != NULL && colours != NULL);
+    assert_true(b.order != NULL && keys != NULL && work != NULL);
     for (uint32_t i = 0; i < n; i++) {
         mospt_vertex v = mospt_vertex_of(site->records + i * site->stride);
         keys[i] = mospt_cell_code(v.x, v.y, v.z, site->grid.bits, code_levels) << INDEX_BITS | i;
-        memcpy(&colours[i], &v.r, sizeof colours[i]);
     }
     prep_sort_keys(keys, keys + n, n, INDEX_BITS);
     mospt_linear_build(&input, keys, n, work, b.order, b.level_end);
-    free(keys), free(work), free(colours);
+    free(keys), free(work);
     return b;
 }
 
