@@ -30,7 +30,44 @@ void prep_batch_fini(prep_batch *batch)
     free(batch->rgbi);
     for (uint32_t k = 0; k < batch->plane_count; k++)
         free(batch->plane[k]);
+    free(batch->packed.records), free(batch->packed.layout);
     *batch = (prep_batch){0};
+}
+
+prep_places prep_batch_places(const prep_batch *batch)
+{
+    size_t first = batch->count;
+    prep_places places = {
+        .xyz = batch->xyz + 3 * first, .rgbi = batch->rgbi + 4 * first, .rgbi_stride = 4};
+    for (uint32_t k = 0; k < batch->plane_count; k++) {
+        places.plane[k] = batch->plane[k] + first * batch->plane_size[k];
+        places.plane_stride[k] = batch->plane_size[k];
+    }
+    return places;
+}
+
+static bool reserve(void **memory, size_t *size, size_t wanted, mospt_err *err)
+{
+    if (*size >= wanted) return true;
+    free(*memory);
+    *memory = malloc(wanted);
+    *size = *memory != NULL ? wanted : 0;
+    return *memory != NULL || mospt_err_nomem(err, wanted);
+}
+
+bool prep_batch_take_packed(prep_batch *batch, prep_unpack *unpack, size_t stride,
+                            const void *layout, size_t layout_size, mospt_err *err)
+{
+    prep_packed *p = &batch->packed;
+    void *records = p->records;
+    bool ok = reserve(&records, &p->size, batch->capacity * stride, err);
+    p->records = records;
+    if (!ok || !reserve(&p->layout, &p->layout_size, layout_size, err)) return false;
+    memcpy(p->layout, layout, layout_size);
+    p->stride = stride;
+    p->unpack = unpack;
+    p->has_lattice = false;
+    return true;
 }
 
 void prep_batch_compact(prep_batch *batch, const uint8_t *keep)

@@ -4,8 +4,38 @@
 
 enum { PREP_BATCH_CAPACITY = 65536 };
 
+/* Where points are written: what belongs to point i stands i strides further on. */
+typedef struct {
+    double *xyz;   /* [count][3], metres, world coordinates; NULL: not wanted */
+    uint8_t *rgbi; /* 4 bytes a point */
+    size_t rgbi_stride;
+    uint8_t *plane[MOSPT_ATTRIBUTES_MAX]; /* one per attribute of the scan; NULL: not wanted */
+    size_t plane_stride[MOSPT_ATTRIBUTES_MAX];
+} prep_places;
+
+/* Takes `count` records of a file apart.
+ * layout   of the format's own type
+ * threads  any */
+typedef void prep_unpack(const void *layout, const uint8_t *records, uint32_t count,
+                         const prep_places *to);
+
+/* Points as they stand in their file, for whoever takes them apart on many threads where they are
+ * needed, instead of on the one that reads. */
+typedef struct {
+    prep_unpack *unpack; /* NULL: the batch holds its points in planes */
+    uint8_t *records;    /* [capacity of the batch][stride], owned */
+    size_t size, stride; /* bytes that are allocated, bytes of a record */
+    void *layout;        /* owned, [layout_size] */
+    size_t layout_size;
+    bool has_lattice; /* records begin with x, y, z as int32, little endian; x * scale + offset is
+                         a world coordinate */
+    double scale[3], offset[3];
+} prep_packed;
+
 typedef struct {
     uint32_t capacity, count;
+    bool takes_packed; /* whoever uses the batch can unpack it */
+    prep_packed packed;
     double *xyz;   /* [capacity][3], owned, metres, world coordinates */
     uint8_t *rgbi; /* [capacity][4], owned, display colour and intensity; without colour r = g = b =
                       i, without both 255 */
@@ -22,6 +52,15 @@ void prep_batch_fini(prep_batch *batch);
 
 /* True if points with these attributes fit the planes of the batch. */
 bool prep_batch_suits(const prep_batch *batch, const mospt_schema *schema);
+
+/* The places behind the points that a batch holds. */
+prep_places prep_batch_places(const prep_batch *batch);
+
+/* Makes room for packed records, and remembers how they are unpacked; `packed` is filled but for
+ * `records`.
+ * errors   MOSPT_ENOMEM */
+bool prep_batch_take_packed(prep_batch *batch, prep_unpack *unpack, size_t stride,
+                            const void *layout, size_t layout_size, mospt_err *err);
 
 /* Removes the points for which keep[i] is 0, in place; the others keep their order. */
 void prep_batch_compact(prep_batch *batch, const uint8_t *keep);

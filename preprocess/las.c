@@ -1,9 +1,11 @@
 #include "preprocess/las.h"
 
+#include "preprocess/bytes.h"
 #include "preprocess/laz.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum {
     BLOCK_SIZE = 256 * 1024, /* stays in the second-level cache while each attribute is picked from
@@ -183,18 +185,59 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
 
 /* A coder that starts from a damaged first record shifts all that follow, and nothing in the stream
  * tells; the bounds in the header do. */
-static void check_first_point(prep_scan *scan, const las_state *las, const double *xyz)
+static void check_first_point(prep_scan *scan, const las_state *las, const uint8_t *record)
 {
     const prep_las_header *h = &las->header;
     for (int a = 0; h->has_bounds && a < 3; a++) {
+        double at = (int32_t)prep_le32(record + 4 * a) * h->scale[a] + h->offset[a];
         if (h->low[a] == h->high[a]) continue; /* as good as not filled in */
-        if (xyz[a] >= h->low[a] - h->scale[a] && xyz[a] <= h->high[a] + h->scale[a]) continue;
+        if (at >= h->low[a] - h->scale[a] && at <= h->high[a] + h->scale[a]) continue;
         prep_scan_set_damage(scan, mospt_at_byte(scan->path, h->data_offset),
                              "the first point, at %.10g along %c, is outside the header's bounds: "
                              "one of them is damaged, and all points after it may be shifted",
-                             xyz[a], "xyz"[a]);
+                             at, "xyz"[a]);
         return;
     }
+}
+
+/* A batch that takes packed records gets them, if every point that they can hold is wanted as it
+ * is. */
+static bool choose_packing(const prep_scan *scan, const las_state *las, prep_batch *batch,
+                           mospt_err *err)
+{
+    const prep_las_header *h = &las->header;
+    double low[3], high[3];
+    for (int a = 0; a < 3; a++) {
+        double first = INT32_MIN * h->scale[a] + h->offset[a],
+               last = INT32_MAX * h->scale[a] + h->offset[a];
+        low[a] = first < last ? first : last;
+        high[a] = first < last ? last : first;
+    }
+    if (!batch->takes_packed || !prep_scan_keeps_all(scan, low, high)) return true;
+    if (!prep_batch_take_packed(batch, prep_las_unpack, h->record_length, &las->layout,
+                                sizeof las->layout, err))
+        return false;
+    batch->packed.has_lattice = true;
+    memcpy(batch->packed.scale, h->scale, sizeof h->scale);
+    memcpy(batch->packed.offset, h->offset, sizeof h->offset);
+    return true;
+}
+
+/* Where the next record of a batch goes as it is; NULL: it is unpacked. */
+static uint8_t *next_packed(const prep_batch *batch)
+{
+    if (batch->packed.unpack == NULL) return NULL;
+    return batch->packed.records + batch->count * batch->packed.stride;
+}
+
+/* Appends records, which may stand in their place already. */
+static void append(const las_state *las, const uint8_t *records, size_t count, prep_batch *batch)
+{
+    uint8_t *packed = next_packed(batch);
+    prep_places places = prep_batch_places(batch);
+    if (packed == NULL) prep_las_unpack(&las->layout, records, (uint32_t)count, &places);
+    else if (packed != records) memcpy(packed, records, count * batch->packed.stride);
+    batch->count += (uint32_t)count;
 }
 
 static bool read_chunks(prep_scan *scan, las_state *las, prep_batch *batch, mospt_err *err)
@@ -205,29 +248,28 @@ static bool read_chunks(prep_scan *scan, las_state *las, prep_batch *batch, mosp
         if (!prep_laz_read(las->laz, batch->capacity - batch->count, &records, &count, err))
             return false;
         if (count == 0) break;
-        prep_las_decode(&las->layout, records, (uint32_t)count, batch);
-        if (las->next == 0) check_first_point(scan, las, batch->xyz);
+        append(las, records, count, batch);
+        if (las->next == 0) check_first_point(scan, las, records);
         las->next += count;
     }
     note_laz_damage(scan, las->laz);
     return true;
 }
 
-static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
+static bool read_records(prep_scan *scan, las_state *las, prep_batch *batch, mospt_err *err)
 {
-    las_state *las = scan->state;
-    if (las->laz != NULL) return read_chunks(scan, las, batch, err);
-    if (!alloc_block(las, err)) return false;
     uint64_t length = las->header.record_length;
+    bool is_packed = batch->packed.unpack != NULL;
+    if (!is_packed && !alloc_block(las, err)) return false;
     while (batch->count < batch->capacity && las->next < las->header.present) {
+        uint8_t *records = is_packed ? next_packed(batch) : las->block;
         uint64_t n = las->header.present - las->next;
-        if (n > las->block_records) n = las->block_records;
         if (n > batch->capacity - batch->count) n = batch->capacity - batch->count;
+        if (!is_packed && n > las->block_records) n = las->block_records;
         size_t got;
         uint64_t offset = record_offset(las, las->next);
-        if (!prep_input_read_at(scan->input, offset, las->block, n * length, &got, err))
-            return false;
-        prep_las_decode(&las->layout, las->block, (uint32_t)(got / length), batch);
+        if (!prep_input_read_at(scan->input, offset, records, n * length, &got, err)) return false;
+        append(las, records, got / length, batch);
         las->next += got / length;
         if (got == n * length) continue;
         prep_scan_set_damage(scan, mospt_at_byte(scan->path, offset + got),
@@ -235,6 +277,14 @@ static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
         las->next = las->header.present;
     }
     return true;
+}
+
+static bool las_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
+{
+    las_state *las = scan->state;
+    if (!choose_packing(scan, las, batch, err)) return false;
+    return las->laz != NULL ? read_chunks(scan, las, batch, err)
+                            : read_records(scan, las, batch, err);
 }
 
 static bool las_rewind(prep_scan *scan, mospt_err *err)

@@ -101,9 +101,8 @@ typedef struct {
 void prep_las_layout_make(prep_scan *scan, const prep_las_header *header, prep_las_sample *sample,
                           prep_las_layout *out);
 
-/* Appends `count` records to a batch that has room for them. */
-void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
-                     prep_batch *batch);
+/* A prep_unpack for records of a prep_las_layout. */
+prep_unpack prep_las_unpack;
 
 /* Fills scan->info with what the header says: format, count, bounds, step, offset. */
 void prep_las_describe(prep_scan *scan, const prep_las_header *header);

@@ -189,80 +189,88 @@ static void decode_xyz(const prep_las_layout *l, const uint8_t *p, uint32_t coun
     }
 }
 
-static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count,
-                           uint8_t *rgbi)
+static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
+                           size_t out_stride)
 {
     prep_tone tone = l->tone;
     size_t stride = l->record_length;
-    for (uint32_t i = 0; i < count; i++, p += stride, rgbi += 4)
-        memset(rgbi, l->has_intensity ? prep_tone_apply(&tone, prep_le16(p + 12)) : 255, 4);
+    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride)
+        memset(out, l->has_intensity ? prep_tone_apply(&tone, prep_le16(p + 12)) : 255, 4);
 }
 
-static void show_rgb(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *rgbi)
+static void show_rgb(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
+                     size_t out_stride)
 {
     size_t stride = l->record_length;
     p += l->rgb_at;
-    for (uint32_t i = 0; i < count; i++, p += stride, rgbi += 4) {
+    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
         for (int c = 0; c < 3; c++) {
             uint16_t v = prep_le16(p + 2 * c);
-            rgbi[c] = l->rgb_is_16 ? prep_tone_from_16(v) : v < 255 ? (uint8_t)v : 255;
+            out[c] = l->rgb_is_16 ? prep_tone_from_16(v) : v < 255 ? (uint8_t)v : 255;
         }
     }
 }
 
-static void copy_1(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+/* One field of a block: where it is read and where it is written. */
+typedef struct {
+    const uint8_t *from;
+    size_t from_stride;
+    uint8_t *to;
+    size_t to_stride;
+    uint32_t count;
+} run;
+
+static void copy_1(run r)
 {
-    for (uint32_t i = 0; i < count; i++, p += stride)
-        out[i] = *p;
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
+        *r.to = *r.from;
 }
 
-static void copy_2(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+static void copy_2(run r)
 {
-    for (uint32_t i = 0; i < count; i++, p += stride) {
-        uint16_t v = prep_le16(p);
-        memcpy(out + 2 * (size_t)i, &v, 2);
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
+        uint16_t v = prep_le16(r.from);
+        memcpy(r.to, &v, 2);
     }
 }
 
-static void copy_8(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
+static void copy_6(run r)
 {
-    for (uint32_t i = 0; i < count; i++, p += stride) {
-        uint64_t v = prep_le64(p);
-        memcpy(out + 8 * (size_t)i, &v, 8);
-    }
-}
-
-static void copy_6(const uint8_t *p, size_t stride, uint32_t count, uint8_t *out)
-{
-    for (uint32_t i = 0; i < count; i++, p += stride)
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
         for (size_t c = 0; c < 6; c += 2) {
-            uint16_t v = prep_le16(p + c);
-            memcpy(out + 6 * (size_t)i + c, &v, 2);
+            uint16_t v = prep_le16(r.from + c);
+            memcpy(r.to + c, &v, 2);
         }
+}
+
+static void copy_8(run r)
+{
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
+        uint64_t v = prep_le64(r.from);
+        memcpy(r.to, &v, 8);
+    }
 }
 
 /* Several components, or sizes that are rare. */
-static void copy_any(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
-                     uint8_t *out)
+static void copy_any(const prep_las_field *f, run r)
 {
     size_t size = f->size, row = size * f->components;
-    for (uint32_t i = 0; i < count; i++, p += stride, out += row) {
-        memcpy(out, p, row);
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
+        memcpy(r.to, r.from, row);
         if (!prep_host_is_big_endian()) continue;
         for (size_t k = 0; k < row; k++)
-            out[k] = p[k - k % size + size - 1 - k % size];
+            r.to[k] = r.from[k - k % size + size - 1 - k % size];
     }
 }
 
-static void copy_field(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
-                       uint8_t *out)
+static void copy_field(const prep_las_field *f, run r)
 {
-    if (f->components == 3 && f->size == 2) copy_6(p, stride, count, out);
-    else if (f->components != 1) copy_any(f, p, stride, count, out);
-    else if (f->size == 1) copy_1(p, stride, count, out);
-    else if (f->size == 2) copy_2(p, stride, count, out);
-    else if (f->size == 8) copy_8(p, stride, count, out);
-    else copy_any(f, p, stride, count, out);
+    if (f->components == 3 && f->size == 2) copy_6(r);
+    else if (f->components != 1) copy_any(f, r);
+    else if (f->size == 1) copy_1(r);
+    else if (f->size == 2) copy_2(r);
+    else if (f->size == 8) copy_8(r);
+    else copy_any(f, r);
 }
 
 static uint8_t flags_old(const uint8_t *p)
@@ -275,49 +283,52 @@ static uint8_t flags_new(const uint8_t *p)
     return (uint8_t)((p[0] & 15) | (p[0] >> 6 & 1) << 4 | (p[0] >> 7) << 5);
 }
 
-static void decode_field(const prep_las_field *f, const uint8_t *records, size_t stride,
-                         uint32_t count, uint8_t *out)
+static void unpack_field(const prep_las_field *f, run r)
 {
-    const uint8_t *p = records + f->at;
     uint8_t shift = f->shift, mask = f->mask;
     switch (f->kind) {
     case FIELD_COPY:
-        copy_field(f, p, stride, count, out);
+        copy_field(f, r);
         break;
     case FIELD_BITS:
-        for (uint32_t i = 0; i < count; i++, p += stride)
-            out[i] = (uint8_t)(*p >> shift & mask);
+        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
+            *r.to = (uint8_t)(*r.from >> shift & mask);
         break;
     case FIELD_FLAGS_OLD:
-        for (uint32_t i = 0; i < count; i++, p += stride)
-            out[i] = flags_old(p);
+        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
+            *r.to = flags_old(r.from);
         break;
     default:
-        for (uint32_t i = 0; i < count; i++, p += stride)
-            out[i] = flags_new(p);
+        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
+            *r.to = flags_new(r.from);
         break;
     }
 }
 
-static void decode_block(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
-                         prep_batch *batch)
+/* Of points [begin, begin + count) of all. */
+static void unpack_block(const prep_las_layout *l, const uint8_t *records, uint32_t begin,
+                         uint32_t count, const prep_places *to)
 {
-    uint32_t first = batch->count;
-    uint8_t *rgbi = batch->rgbi + 4 * (size_t)first;
-    decode_xyz(layout, records, count, batch->xyz + 3 * (size_t)first);
-    show_intensity(layout, records, count, rgbi);
-    if (layout->has_rgb) show_rgb(layout, records, count, rgbi);
-    for (uint32_t k = 0; k < layout->field_count; k++)
-        decode_field(&layout->field[k], records, layout->record_length, count,
-                     batch->plane[k] + first * batch->plane_size[k]);
-    batch->count = first + count;
+    uint8_t *rgbi = to->rgbi + begin * to->rgbi_stride;
+    records += begin * (size_t)l->record_length;
+    if (to->xyz != NULL) decode_xyz(l, records, count, to->xyz + 3 * (size_t)begin);
+    show_intensity(l, records, count, rgbi, to->rgbi_stride);
+    if (l->has_rgb) show_rgb(l, records, count, rgbi, to->rgbi_stride);
+    for (uint32_t k = 0; k < l->field_count; k++) {
+        if (to->plane[k] == NULL) continue;
+        unpack_field(&l->field[k], (run){.from = records + l->field[k].at,
+                                         .from_stride = l->record_length,
+                                         .to = to->plane[k] + begin * to->plane_stride[k],
+                                         .to_stride = to->plane_stride[k],
+                                         .count = count});
+    }
 }
 
-void prep_las_decode(const prep_las_layout *layout, const uint8_t *records, uint32_t count,
-                     prep_batch *batch)
+void prep_las_unpack(const void *layout, const uint8_t *records, uint32_t count,
+                     const prep_places *to)
 {
-    for (uint32_t n; count > 0; count -= n, records += n * (size_t)layout->record_length) {
-        n = count < BLOCK ? count : BLOCK;
-        decode_block(layout, records, n, batch);
+    for (uint32_t begin = 0, n; begin < count; begin += n) {
+        n = count - begin < BLOCK ? count - begin : BLOCK;
+        unpack_block(layout, records, begin, n, to);
     }
 }

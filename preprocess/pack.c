@@ -1,12 +1,17 @@
 #include "preprocess/pack.h"
 
 #include "mospt/hash.h"
+#include "preprocess/bytes.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 /* Records that are packed plane by plane while they are in the first cache. */
 enum { BLOCK = 256 };
+
+/* Bytes for planes of a block that are not copied but converted. */
+enum { SCRATCH_SIZE = MOSPT_ROW_SIZE_MAX };
 
 const prep_pack_sums prep_pack_sums_empty = {.low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
 
@@ -29,37 +34,71 @@ static double nearest(double x)
     return fabs(x) < 0x1p51 ? (x + shift) - shift : nearbyint(x);
 }
 
-/* As mospt_grid_from_world(), with what is the same for all points kept out of the loop. */
-static void pack_vertices(const prep_packer *p, const prep_batch *batch, uint32_t begin,
-                          uint32_t end, uint8_t *records, size_t stride, prep_pack_sums *sums)
+/* As mospt_grid_from_world(), with what is the same for all points kept out of the loop.
+ * xyz      [count][3] */
+static void pack_positions(const mospt_grid *grid, const double *xyz, uint32_t count,
+                           uint8_t *records, size_t stride, prep_pack_sums *sums)
 {
-    const mospt_grid *grid = p->grid;
     double step = grid->step, width = ldexp(1, (int)grid->bits), worst = sums->position_error;
     double offset[3], first[3];
     for (int a = 0; a < 3; a++) {
         offset[a] = grid->offset[a];
         first[a] = (double)(grid->base[a] + (int64_t)grid->root[a]);
     }
-    for (uint32_t i = begin; i < end; i++, records += stride) {
-        const double *world = batch->xyz + 3 * (size_t)i;
+    for (uint32_t i = 0; i < count; i++, records += stride, xyz += 3) {
         uint32_t g[3];
         for (int a = 0; a < 3; a++) {
-            double steps = nearest((world[a] - offset[a]) / step), local = steps - first[a];
+            double steps = nearest((xyz[a] - offset[a]) / step), local = steps - first[a];
             if (!(local >= 0 && local < width)) {
                 sums->outside = true;
                 return;
             }
             g[a] = grid->root[a] + (uint32_t)local;
-            double error = fabs(steps * step + offset[a] - world[a]);
+            double error = fabs(steps * step + offset[a] - xyz[a]);
             worst = error > worst ? error : worst;
             sums->low[a] = g[a] < sums->low[a] ? g[a] : sums->low[a];
             sums->high[a] = g[a] > sums->high[a] ? g[a] : sums->high[a];
         }
-        mospt_vertex v = {.x = g[0], .y = g[1], .z = g[2]};
-        memcpy(&v.r, batch->rgbi + 4 * (size_t)i, 4);
-        memcpy(records, &v, sizeof v);
+        memcpy(records, g, sizeof g);
     }
     sums->position_error = worst;
+}
+
+/* True if the positions of packed records are those of the grid, so that its world coordinates are
+ * theirs bit for bit: only whole steps lie between the two, and the doubles between are exact to
+ * far less than half of one. */
+static bool is_same_lattice(const prep_packed *packed, const mospt_grid *grid)
+{
+    bool same = packed->has_lattice;
+    for (int a = 0; a < 3; a++)
+        same = same && packed->scale[a] == grid->step && packed->offset[a] == grid->offset[a] &&
+               fabs(grid->offset[a]) < 0x1p46 * grid->step;
+    return same;
+}
+
+/* As pack_positions() for records of the same lattice. */
+static void pack_lattice(const mospt_grid *grid, const prep_packed *packed, const uint8_t *from,
+                         uint32_t count, uint8_t *records, size_t stride, prep_pack_sums *sums)
+{
+    uint64_t width = UINT64_C(1) << grid->bits;
+    uint32_t low[3], high[3];
+    bool inside = true;
+    memcpy(low, sums->low, sizeof low);
+    memcpy(high, sums->high, sizeof high);
+    for (uint32_t i = 0; i < count; i++, from += packed->stride, records += stride) {
+        uint32_t g[3];
+        for (int a = 0; a < 3; a++) {
+            int64_t cell = (int32_t)prep_le32(from + 4 * a) - grid->base[a];
+            inside = inside && (uint64_t)cell - grid->root[a] < width;
+            g[a] = (uint32_t)cell;
+            low[a] = g[a] < low[a] ? g[a] : low[a];
+            high[a] = g[a] > high[a] ? g[a] : high[a];
+        }
+        memcpy(records, g, sizeof g);
+    }
+    sums->outside = sums->outside || !inside;
+    memcpy(sums->low, low, sizeof low);
+    memcpy(sums->high, high, sizeof high);
 }
 
 /* The same value in every row. */
@@ -94,6 +133,10 @@ static void copy_plane(const uint8_t *plane, size_t size, uint32_t count, uint8_
         for (uint32_t i = 0; i < count; i++)
             memcpy(rows + i * stride, plane + 2 * (size_t)i, 2);
         return;
+    case 4:
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(rows + i * stride, plane + 4 * (size_t)i, 4);
+        return;
     case 6:
         for (uint32_t i = 0; i < count; i++)
             memcpy(rows + i * stride, plane + 6 * (size_t)i, 6);
@@ -125,24 +168,89 @@ static origins find_origins(const prep_packer *p)
     return o;
 }
 
-static void pack_attributes(const prep_packer *p, const origins *o, const prep_batch *batch,
-                            uint32_t begin, uint32_t count, uint8_t *records, size_t stride)
+/* The rows of an attribute of the dataset. */
+static uint8_t *rows_of(const prep_packer *p, uint32_t k, uint8_t *records)
+{
+    return records + sizeof(mospt_vertex) + p->schema->at[k].offset;
+}
+
+/* An attribute that the scan does not have: its own number, or zeros. */
+static void pack_missing(const prep_packer *p, const origins *o, uint32_t k, uint32_t count,
+                         uint8_t *records, size_t stride)
 {
     static const uint8_t zero[255 * 8];
+    pack_constant(rows_of(p, k, records), stride, count,
+                  (int)k == o->scan_attribute ? o->scan : zero,
+                  mospt_attribute_size(&p->schema->at[k]));
+}
+
+static bool is_converted(const prep_packer *p, const origins *o, uint32_t k)
+{
+    return o->plane[k] >= 0 && p->planes->at[o->plane[k]].type != p->schema->at[k].type;
+}
+
+/* A block of points in planes. */
+static void pack_planes(const prep_packer *p, const origins *o, const prep_batch *batch,
+                        uint32_t begin, uint32_t count, uint8_t *records, prep_pack_sums *sums)
+{
+    size_t stride = mospt_record_size(p->schema);
+    pack_positions(p->grid, batch->xyz + 3 * (size_t)begin, count, records, stride, sums);
+    copy_plane(batch->rgbi + 4 * (size_t)begin, 4, count, records + offsetof(mospt_vertex, r),
+               stride);
     for (uint32_t k = 0; k < p->schema->count; k++) {
-        const mospt_attribute *to = &p->schema->at[k];
-        uint8_t *rows = records + sizeof(mospt_vertex) + to->offset;
         int from = o->plane[k];
         if (from < 0) {
-            pack_constant(rows, stride, count, (int)k == o->scan_attribute ? o->scan : zero,
-                          mospt_attribute_size(to));
+            pack_missing(p, o, k, count, records, stride);
             continue;
         }
         const uint8_t *plane = batch->plane[from] + begin * batch->plane_size[from];
-        if (p->planes->at[from].type != to->type)
-            convert_plane(plane, &p->planes->at[from], to, count, rows, stride);
-        else copy_plane(plane, batch->plane_size[from], count, rows, stride);
+        if (is_converted(p, o, k))
+            convert_plane(plane, &p->planes->at[from], &p->schema->at[k], count,
+                          rows_of(p, k, records), stride);
+        else copy_plane(plane, batch->plane_size[from], count, rows_of(p, k, records), stride);
     }
+}
+
+/* A block of points as their file has them, which are unpacked where the records want them. */
+static void pack_packed(const prep_packer *p, const origins *o, const prep_batch *batch,
+                        uint32_t begin, uint32_t count, uint8_t *records, prep_pack_sums *sums)
+{
+    const prep_packed *packed = &batch->packed;
+    const uint8_t *from = packed->records + begin * packed->stride;
+    bool same_lattice = is_same_lattice(packed, p->grid);
+    size_t stride = mospt_record_size(p->schema);
+    double xyz[3 * BLOCK];
+    uint8_t scratch[SCRATCH_SIZE], *spare = scratch;
+    prep_places to = {.xyz = same_lattice ? NULL : xyz,
+                      .rgbi = records + offsetof(mospt_vertex, r),
+                      .rgbi_stride = stride};
+    for (uint32_t k = 0; k < p->schema->count; k++) {
+        int plane = o->plane[k];
+        if (plane < 0) {
+            pack_missing(p, o, k, count, records, stride);
+            continue;
+        }
+        bool converted = is_converted(p, o, k);
+        to.plane[plane] = converted ? spare : rows_of(p, k, records);
+        to.plane_stride[plane] = converted ? batch->plane_size[plane] : stride;
+        spare += converted ? count * batch->plane_size[plane] : 0;
+    }
+    packed->unpack(packed->layout, from, count, &to);
+    for (uint32_t k = 0; k < p->schema->count; k++)
+        if (is_converted(p, o, k))
+            convert_plane(to.plane[o->plane[k]], &p->planes->at[o->plane[k]], &p->schema->at[k],
+                          count, rows_of(p, k, records), stride);
+    if (same_lattice) pack_lattice(p->grid, packed, from, count, records, stride, sums);
+    else pack_positions(p->grid, xyz, count, records, stride, sums);
+}
+
+/* As many points as have room for what is converted of them. */
+static uint32_t block_size(const prep_packer *p, const origins *o)
+{
+    size_t size = 0;
+    for (uint32_t k = 0; k < p->schema->count; k++)
+        if (is_converted(p, o, k)) size += mospt_attribute_size(&p->planes->at[o->plane[k]]);
+    return size * BLOCK <= SCRATCH_SIZE ? BLOCK : (uint32_t)(SCRATCH_SIZE / size);
 }
 
 void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end,
@@ -150,10 +258,11 @@ void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, ui
 {
     size_t stride = mospt_record_size(p->schema);
     origins from = find_origins(p);
+    uint32_t block = block_size(p, &from);
     for (uint32_t i = begin, n; i < end && !sums->outside; i += n, records += n * stride) {
-        n = end - i < BLOCK ? end - i : BLOCK;
-        pack_vertices(p, batch, i, i + n, records, stride, sums);
-        pack_attributes(p, &from, batch, i, n, records, stride);
+        n = end - i < block ? end - i : block;
+        if (batch->packed.unpack != NULL) pack_packed(p, &from, batch, i, n, records, sums);
+        else pack_planes(p, &from, batch, i, n, records, sums);
         sums->hash += mospt_hash_records(records, stride, n);
     }
 }

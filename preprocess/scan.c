@@ -390,6 +390,11 @@ static bool drop_unusable(prep_scan *scan, prep_batch *batch, mospt_err *err)
     return true;
 }
 
+bool prep_scan_keeps_all(const prep_scan *scan, const double low[3], const double high[3])
+{
+    return !scan->is_moved && !scan->has_crop && is_in_range(scan, low) && is_in_range(scan, high);
+}
+
 static void move_points(const prep_scan *scan, prep_batch *batch)
 {
     for (uint32_t i = 0; i < batch->count; i++) {
@@ -403,8 +408,9 @@ bool prep_scan_read(prep_scan *scan, prep_batch *batch, mospt_err *err)
 {
     do {
         batch->count = 0;
+        batch->packed.unpack = NULL;
         if (!scan->format->read(scan, batch, err)) return false;
-        if (batch->count == 0) return true;
+        if (batch->count == 0 || batch->packed.unpack != NULL) return true;
         if (scan->is_moved) move_points(scan, batch);
         if (!drop_unusable(scan, batch, err)) return false;
     } while (batch->count == 0);

@@ -76,9 +76,11 @@ void prep_scan_close(prep_scan *scan);
 const prep_scan_info *prep_scan_describe(const prep_scan *scan);
 
 /* Fills `batch` with the next points, at most its capacity; count 0 at the end of the scan. Points
- * whose coordinates are not finite are left out and counted. batch    made by prep_batch_init() for
- * the scan's attributes errors   MOSPT_EIO, MOSPT_ENOMEM only: a damaged file ends early and says
- * so through prep_scan_damage() */
+ * whose coordinates are not finite are left out and counted.
+ * batch    made by prep_batch_init() for the scan's attributes; one that takes packed records may
+ *          come with them
+ * errors   MOSPT_EIO, MOSPT_ENOMEM only: a damaged file ends early and says so through
+ *          prep_scan_damage() */
 bool prep_scan_read(prep_scan *scan, prep_batch *batch, mospt_err *err);
 
 /* Goes back to the first point and forgets the counts below. */

@@ -14,7 +14,8 @@ typedef struct {
      * the same. index    scan in the file; a reader that knows only one ignores it */
     bool (*open)(prep_scan *scan, uint32_t index, const prep_scan_options *options, mospt_err *err);
     /* Appends points to the batch (batch->count is where to go on) until it is full or the scan
-     * ends. Large buffers are allocated by the first call. */
+     * ends. Large buffers are allocated by the first call. Fills all of it with packed records, or
+     * none. */
     bool (*read)(prep_scan *scan, prep_batch *batch, mospt_err *err);
     bool (*rewind)(prep_scan *scan, mospt_err *err);
     void (*close)(prep_scan *scan); /* frees scan->state, which may be NULL */
@@ -43,6 +44,10 @@ struct prep_scan {
  * that is told. */
 void prep_scan_set_damage(prep_scan *scan, mospt_where where, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+/* True if the builder gets every point between these bounds, and where the file puts it: neither
+ * moved nor cropped nor out of range. Then a batch that takes packed records may be given them. */
+bool prep_scan_keeps_all(const prep_scan *scan, const double low[3], const double high[3]);
 
 /* Appends an attribute under a name that is printable, not empty, not too long and not taken yet.
  * returns  its index, or -1 if there is no room for more */

@@ -273,6 +273,7 @@ static bool prepare(prep_stream *st, slot *to, uint32_t scan, mospt_err *err)
     if (to->made && prep_batch_suits(&to->batch, attributes)) return true;
     if (to->made) prep_batch_fini(&to->batch);
     to->made = prep_batch_init(&to->batch, attributes, st->capacity, err);
+    to->batch.takes_packed = to->made;
     return to->made;
 }
 
@@ -308,6 +309,7 @@ static bool stream_spool(prep_stream *st, uint32_t index, mospt_err *err)
             return false;
         at += sizeof count;
         to->batch.count = count;
+        to->batch.packed.unpack = NULL;
         if (!move_batch(s, &to->batch, &at, false, err)) return false;
         hand_over(st);
     }

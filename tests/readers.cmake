@@ -9,6 +9,7 @@ foreach(name
     test_folder
     test_las
     test_number
+    test_pack
     test_ply
     test_real_scans
     test_scan_memory
