@@ -1,15 +1,12 @@
-/* render/film/av.h - what encoder.c and join.c share. The only header with those of FFmpeg in it.
- */
+/* render/film/av.h - what encoder.c and join.c share. */
 #pragma once
-#include "mospt/err.h"
-
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
+#include "render/film/libav.h"
 
 /* Says what one of FFmpeg's negative numbers means; returns false. */
 bool rfilm_av_fail(mospt_err *err, const char *path, const char *what, int code);
 
-/* The muxer for the ending of `container`, with the file not yet open.
+/* Loads FFmpeg's libraries and makes the muxer for the ending of `container`, with the file not yet
+ * open.
  * errors   MOSPT_EINVAL, MOSPT_ENOMEM */
 bool rfilm_av_muxer(const char *container, AVFormatContext **out, mospt_err *err);
 

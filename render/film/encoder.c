@@ -2,11 +2,6 @@
 
 #include "render/film/av.h"
 
-#include <libavutil/opt.h>
-#include <libavutil/spherical.h>
-#include <libavutil/stereo3d.h>
-#include <libswscale/swscale.h>
-
 #include <stdlib.h>
 #include <string.h>
 
@@ -102,24 +97,24 @@ static void set_codec_options(AVCodecContext *c, const rfilm_options *o)
 {
     uint32_t quality = o->has_quality ? o->quality : CODECS[o->codec].quality;
     if (CODECS[o->codec].speed_option != NULL) {
-        av_opt_set(c->priv_data, CODECS[o->codec].speed_option, CODECS[o->codec].speeds[o->preset],
-                   0);
-        av_opt_set_int(c->priv_data, "crf", quality, 0);
+        libav.av_opt_set(c->priv_data, CODECS[o->codec].speed_option,
+                         CODECS[o->codec].speeds[o->preset], 0);
+        libav.av_opt_set_int(c->priv_data, "crf", quality, 0);
     }
     /* Without it some sizes give other bytes whenever memory was used before, or on other
      * processors.
      */
     if (o->codec == RFILM_H264)
-        av_opt_set(c->priv_data, "x264-params", "cpu-independent=1:rc-lookahead=12", 0);
+        libav.av_opt_set(c->priv_data, "x264-params", "cpu-independent=1:rc-lookahead=12", 0);
     if (o->codec == RFILM_VP9) {
         c->bit_rate = 0; /* or crf would only be a limit */
-        av_opt_set(c->priv_data, "row-mt", "1", 0);
+        libav.av_opt_set(c->priv_data, "row-mt", "1", 0);
     }
     if (o->codec == RFILM_FFV1) {
         c->level = 3;
         c->gop_size = 1;
         c->slices = 16;
-        av_opt_set(c->priv_data, "slicecrc", "1", 0);
+        libav.av_opt_set(c->priv_data, "slicecrc", "1", 0);
     }
 }
 
@@ -128,11 +123,11 @@ static bool open_codec(rfilm_encoder *e, mospt_err *err)
     const rfilm_options *o = &e->options;
     /* SVT-AV1 would write to standard error; errors only. */
     setenv("SVT_LOG", "1", 0);
-    const AVCodec *codec = avcodec_find_encoder_by_name(CODECS[o->codec].encoders[0]);
+    const AVCodec *codec = libav.avcodec_find_encoder_by_name(CODECS[o->codec].encoders[0]);
     if (codec == NULL)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(e->path),
                              "the FFmpeg of this machine has no %s", CODECS[o->codec].encoders[0]);
-    AVCodecContext *c = e->codec = avcodec_alloc_context3(codec);
+    AVCodecContext *c = e->codec = libav.avcodec_alloc_context3(codec);
     if (c == NULL) return mospt_err_nomem(err, sizeof *c);
     c->width = (int)o->width, c->height = (int)o->height;
     c->time_base = (AVRational){(int)o->rate_den, (int)o->rate_num};
@@ -145,7 +140,7 @@ static bool open_codec(rfilm_encoder *e, mospt_err *err)
     if (e->muxer->oformat->flags & AVFMT_GLOBALHEADER) c->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
     tag_colours(c, o->codec == RFILM_FFV1);
     set_codec_options(c, o);
-    int code = avcodec_open2(c, codec, NULL);
+    int code = libav.avcodec_open2(c, codec, NULL);
     return code >= 0 || rfilm_av_fail(err, e->path, "the encoder does not start", code);
 }
 
@@ -154,33 +149,33 @@ static bool describe(rfilm_encoder *e, mospt_err *err)
 {
     size_t size;
     if (e->options.panorama) {
-        AVSphericalMapping *sphere = av_spherical_alloc(&size);
+        AVSphericalMapping *sphere = libav.av_spherical_alloc(&size);
         if (sphere == NULL) return mospt_err_nomem(err, 0);
         sphere->projection = AV_SPHERICAL_EQUIRECTANGULAR;
-        int code =
-            av_stream_add_side_data(e->stream, AV_PKT_DATA_SPHERICAL, (uint8_t *)sphere, size);
-        if (code < 0) return av_free(sphere), mospt_err_nomem(err, size);
+        int code = libav.av_stream_add_side_data(e->stream, AV_PKT_DATA_SPHERICAL,
+                                                 (uint8_t *)sphere, size);
+        if (code < 0) return libav.av_free(sphere), mospt_err_nomem(err, size);
     }
     if (e->options.side_by_side) {
-        AVStereo3D *stereo = av_stereo3d_alloc();
+        AVStereo3D *stereo = libav.av_stereo3d_alloc();
         if (stereo == NULL) return mospt_err_nomem(err, 0);
         stereo->type = AV_STEREO3D_SIDEBYSIDE;
-        int code = av_stream_add_side_data(e->stream, AV_PKT_DATA_STEREO3D, (uint8_t *)stereo,
-                                           sizeof *stereo);
-        if (code < 0) return av_free(stereo), mospt_err_nomem(err, sizeof *stereo);
-        av_dict_set(&e->stream->metadata, "stereo_mode", "left_right", 0);
+        int code = libav.av_stream_add_side_data(e->stream, AV_PKT_DATA_STEREO3D, (uint8_t *)stereo,
+                                                 sizeof *stereo);
+        if (code < 0) return libav.av_free(stereo), mospt_err_nomem(err, sizeof *stereo);
+        libav.av_dict_set(&e->stream->metadata, "stereo_mode", "left_right", 0);
     }
     return true;
 }
 
 static bool open_stream(rfilm_encoder *e, mospt_err *err)
 {
-    e->stream = avformat_new_stream(e->muxer, NULL);
+    e->stream = libav.avformat_new_stream(e->muxer, NULL);
     if (e->stream == NULL) return mospt_err_nomem(err, sizeof *e->stream);
     e->stream->time_base = e->codec->time_base;
     e->stream->avg_frame_rate = e->stream->r_frame_rate = e->codec->framerate;
     e->stream->sample_aspect_ratio = e->codec->sample_aspect_ratio;
-    int code = avcodec_parameters_from_context(e->stream->codecpar, e->codec);
+    int code = libav.avcodec_parameters_from_context(e->stream->codecpar, e->codec);
     if (code < 0) return rfilm_av_fail(err, e->path, "the encoder does not start", code);
     return describe(e, err);
 }
@@ -190,25 +185,25 @@ static bool open_scaler(rfilm_encoder *e, mospt_err *err)
 {
     const rfilm_options *o = &e->options;
     int width = (int)o->width, height = (int)o->height;
-    const int *bt709 = sws_getCoefficients(SWS_CS_ITU709);
-    e->scaler = sws_getContext(width, height, picture_format(o), width, height, film_format(o),
-                               SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_BITEXACT,
-                               NULL, NULL, NULL);
-    e->frame = av_frame_alloc();
-    e->packet = av_packet_alloc();
+    const int *bt709 = libav.sws_getCoefficients(SWS_CS_ITU709);
+    e->scaler = libav.sws_getContext(
+        width, height, picture_format(o), width, height, film_format(o),
+        SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_BITEXACT, NULL, NULL, NULL);
+    e->frame = libav.av_frame_alloc();
+    e->packet = libav.av_packet_alloc();
     if (e->scaler == NULL || e->frame == NULL || e->packet == NULL) return mospt_err_nomem(err, 0);
     if (o->codec != RFILM_FFV1)
-        sws_setColorspaceDetails(e->scaler, bt709, 1, bt709, 0, 0, 1 << 16, 1 << 16);
+        libav.sws_setColorspaceDetails(e->scaler, bt709, 1, bt709, 0, 0, 1 << 16, 1 << 16);
     e->frame->format = film_format(o);
     e->frame->width = width, e->frame->height = height;
-    return av_frame_get_buffer(e->frame, 0) >= 0 || mospt_err_nomem(err, 0);
+    return libav.av_frame_get_buffer(e->frame, 0) >= 0 || mospt_err_nomem(err, 0);
 }
 
 bool rfilm_encoder_open(const char *path, const char *container, const rfilm_options *options,
                         rfilm_encoder **out, mospt_err *err)
 {
-    if (!check(options, path, err)) return false;
-    rfilm_encoder *e = av_mallocz(sizeof *e);
+    if (!check(options, path, err) || !rfilm_libav_load(err)) return false;
+    rfilm_encoder *e = calloc(1, sizeof *e);
     if (e == NULL) return mospt_err_nomem(err, sizeof *e);
     e->options = *options;
     strncpy(e->path, path, sizeof e->path - 1);
@@ -225,13 +220,13 @@ bool rfilm_encoder_open(const char *path, const char *container, const rfilm_opt
 static bool drain(rfilm_encoder *e, mospt_err *err)
 {
     for (;;) {
-        int code = avcodec_receive_packet(e->codec, e->packet);
+        int code = libav.avcodec_receive_packet(e->codec, e->packet);
         if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return true;
         if (code < 0) return rfilm_av_fail(err, e->path, "a frame cannot be encoded", code);
         e->packet->duration = 1;
-        av_packet_rescale_ts(e->packet, e->codec->time_base, e->stream->time_base);
+        libav.av_packet_rescale_ts(e->packet, e->codec->time_base, e->stream->time_base);
         e->packet->stream_index = e->stream->index;
-        code = av_interleaved_write_frame(e->muxer, e->packet);
+        code = libav.av_interleaved_write_frame(e->muxer, e->packet);
         if (code < 0) return rfilm_av_fail(err, e->path, "the film cannot be written", code);
     }
 }
@@ -241,19 +236,19 @@ bool rfilm_encoder_add(rfilm_encoder *encoder, const void *rgb, mospt_err *err)
     rfilm_encoder *e = encoder;
     const uint8_t *const planes[4] = {rgb};
     const int strides[4] = {(int)(e->options.width * 3 * (e->options.bits / 8))};
-    int code = av_frame_make_writable(e->frame);
+    int code = libav.av_frame_make_writable(e->frame);
     if (code < 0) return mospt_err_nomem(err, 0);
-    sws_scale(e->scaler, planes, strides, 0, (int)e->options.height, e->frame->data,
-              e->frame->linesize);
+    libav.sws_scale(e->scaler, planes, strides, 0, (int)e->options.height, e->frame->data,
+                    e->frame->linesize);
     e->frame->pts = e->count++;
-    code = avcodec_send_frame(e->codec, e->frame);
+    code = libav.avcodec_send_frame(e->codec, e->frame);
     if (code < 0) return rfilm_av_fail(err, e->path, "a frame cannot be encoded", code);
     return drain(e, err);
 }
 
 bool rfilm_encoder_finish(rfilm_encoder *encoder, mospt_err *err)
 {
-    int code = avcodec_send_frame(encoder->codec, NULL);
+    int code = libav.avcodec_send_frame(encoder->codec, NULL);
     if (code < 0)
         return rfilm_av_fail(err, encoder->path, "the last frames cannot be encoded", code);
     return drain(encoder, err) && rfilm_av_end(encoder->muxer, encoder->path, err);
@@ -262,10 +257,10 @@ bool rfilm_encoder_finish(rfilm_encoder *encoder, mospt_err *err)
 void rfilm_encoder_destroy(rfilm_encoder *encoder)
 {
     if (encoder == NULL) return;
-    avcodec_free_context(&encoder->codec);
-    av_frame_free(&encoder->frame);
-    av_packet_free(&encoder->packet);
-    sws_freeContext(encoder->scaler);
+    libav.avcodec_free_context(&encoder->codec);
+    libav.av_frame_free(&encoder->frame);
+    libav.av_packet_free(&encoder->packet);
+    libav.sws_freeContext(encoder->scaler);
     rfilm_av_free(encoder->muxer);
-    av_free(encoder);
+    free(encoder);
 }

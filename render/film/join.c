@@ -14,8 +14,8 @@ typedef struct {
 
 static bool open_input(const char *path, AVFormatContext **out, AVStream **stream, mospt_err *err)
 {
-    int code = avformat_open_input(out, path, NULL, NULL);
-    if (code >= 0) code = avformat_find_stream_info(*out, NULL);
+    int code = libav.avformat_open_input(out, path, NULL, NULL);
+    if (code >= 0) code = libav.avformat_find_stream_info(*out, NULL);
     if (code == AVERROR(ENOENT) || code == AVERROR(EACCES))
         return rfilm_av_fail(err, path, "cannot be opened", code);
     if (code < 0 || (*out)->nb_streams != 1 ||
@@ -30,15 +30,16 @@ static bool open_input(const char *path, AVFormatContext **out, AVStream **strea
 static bool start(joiner *j, const AVStream *first, mospt_err *err)
 {
     j->rate = first->avg_frame_rate.num > 0 ? first->avg_frame_rate : first->r_frame_rate;
-    j->stream = avformat_new_stream(j->muxer, NULL);
-    if (j->stream == NULL || avcodec_parameters_copy(j->stream->codecpar, first->codecpar) < 0 ||
-        av_dict_copy(&j->stream->metadata, first->metadata, 0) < 0)
+    j->stream = libav.avformat_new_stream(j->muxer, NULL);
+    if (j->stream == NULL ||
+        libav.avcodec_parameters_copy(j->stream->codecpar, first->codecpar) < 0 ||
+        libav.av_dict_copy(&j->stream->metadata, first->metadata, 0) < 0)
         return mospt_err_nomem(err, 0);
     if (j->rate.num <= 0 || j->rate.den <= 0)
         return mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(j->path), "has no frame rate");
     for (int i = 0; i < first->nb_side_data; i++) {
         const AVPacketSideData *from = &first->side_data[i];
-        uint8_t *to = av_stream_new_side_data(j->stream, from->type, from->size);
+        uint8_t *to = libav.av_stream_new_side_data(j->stream, from->type, from->size);
         if (to == NULL) return mospt_err_nomem(err, from->size);
         memcpy(to, from->data, from->size);
     }
@@ -60,25 +61,26 @@ static bool is_same_kind(const AVCodecParameters *a, const AVCodecParameters *b)
 /* Containers count time in their own units; a frame's number is what it was meant to be. */
 static int64_t frame_number(const joiner *j, int64_t time, AVRational unit)
 {
-    return time == AV_NOPTS_VALUE ? time : av_rescale_q(time, unit, av_inv_q(j->rate)) + j->frames;
+    return time == AV_NOPTS_VALUE ? time
+                                  : libav.av_rescale_q(time, unit, av_inv_q(j->rate)) + j->frames;
 }
 
 static bool copy_packets(joiner *j, AVFormatContext *from, const char *path, mospt_err *err)
 {
-    AVPacket *packet = av_packet_alloc();
+    AVPacket *packet = libav.av_packet_alloc();
     int64_t count = 0;
     int code = packet == NULL ? AVERROR(ENOMEM) : 0;
-    while (code >= 0 && (code = av_read_frame(from, packet)) >= 0) {
+    while (code >= 0 && (code = libav.av_read_frame(from, packet)) >= 0) {
         AVRational unit = from->streams[0]->time_base;
         packet->pts = frame_number(j, packet->pts, unit);
         packet->dts = frame_number(j, packet->dts, unit);
         packet->duration = 1;
         packet->pos = -1;
-        av_packet_rescale_ts(packet, av_inv_q(j->rate), j->stream->time_base);
-        code = av_interleaved_write_frame(j->muxer, packet);
+        libav.av_packet_rescale_ts(packet, av_inv_q(j->rate), j->stream->time_base);
+        code = libav.av_interleaved_write_frame(j->muxer, packet);
         count++;
     }
-    av_packet_free(&packet);
+    libav.av_packet_free(&packet);
     if (code != AVERROR_EOF) return rfilm_av_fail(err, path, "cannot be copied", code);
     j->frames += count;
     return true;
@@ -94,7 +96,7 @@ static bool add_input(joiner *j, const char *path, bool first, mospt_err *err)
         ok = mospt_err_set(err, MOSPT_EFORMAT, mospt_at_file(path),
                            "was recorded with other settings than the first film");
     ok = ok && copy_packets(j, from, path, err);
-    avformat_close_input(&from);
+    libav.avformat_close_input(&from);
     return ok;
 }
 
