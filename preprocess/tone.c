@@ -10,6 +10,23 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Sorts values that are whole numbers of 16 bits, as most are, by counting them. Returns false
+ * where one is not. */
+static bool sort_by_counting(double *values, size_t count)
+{
+    uint32_t *counts = calloc(UINT16_MAX + 1, sizeof *counts);
+    bool fits = counts != NULL;
+    for (size_t i = 0; fits && i < count; i++) {
+        fits = values[i] >= 0 && values[i] <= UINT16_MAX && values[i] == (uint16_t)values[i];
+        if (fits) counts[(uint16_t)values[i]]++;
+    }
+    for (uint32_t v = 0, out = 0; fits && out < count; v++)
+        for (uint32_t i = 0; i < counts[v]; i++)
+            values[out++] = v;
+    free(counts);
+    return fits;
+}
+
 /* Half of the points should not be darker than this share of white... */
 static const double MEDIAN_SHOWN = 0.35;
 /* ... but noise in the dark is not to be blown up without bound. */
@@ -29,7 +46,7 @@ prep_tone prep_tone_make(double *values, size_t count)
     size_t n = 0;
     for (size_t i = 0; i < count; i++)
         if (isfinite(values[i])) values[n++] = values[i];
-    if (n > 0) qsort(values, n, sizeof *values, compare);
+    if (n > 0 && !sort_by_counting(values, n)) qsort(values, n, sizeof *values, compare);
     if (n == 0 || values[0] == values[n - 1]) {
         memset(tone.curve, 255, sizeof tone.curve);
         return tone;
