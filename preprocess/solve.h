@@ -7,6 +7,7 @@
 #pragma once
 #include "mospt/linear.h"
 #include "mospt/payload.h"
+#include "preprocess/workers.h"
 
 enum {
     PREP_ADD_THRESHOLD = 4096, /* default: a child has at least so many points */
@@ -24,19 +25,18 @@ typedef struct {
 
 /* A node, and the points that it keeps. */
 typedef struct {
-    mospt_node node;     /* corner, level, child_mask, count and payload_size; the rest is told by
-                            prep_solve_emit() */
-    uint32_t first;      /* of its keys in the subtree */
-    uint32_t cell_shift; /* of them, see mospt_linear_input */
+    mospt_node node; /* corner, level, child_mask, count and payload_size; the rest is told by
+                        prep_solve_emit() */
+    uint64_t *keys;  /* [node.count], borrowed, in the caller's working memory, by rising cell */
+    uint32_t first;  /* so many points of the subtree are in the nodes before it */
+    uint32_t cell_shift; /* of its keys, see mospt_linear_input */
 } prep_solved;
 
 /* Which point is in which node: nodes with their keys, parents first, octants in their order. */
 typedef struct {
     prep_solved *nodes; /* [node_count], owned */
     uint32_t node_count, node_capacity;
-    uint32_t count, index_bits;
-    uint64_t *keys; /* [count], borrowed, in the caller's working memory: those of each node by
-                       rising cell */
+    uint32_t index_bits; /* of the keys */
 } prep_subtree;
 
 void prep_subtree_fini(prep_subtree *subtree);
@@ -54,6 +54,12 @@ size_t prep_solve_work_size(uint32_t count);
 bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
                 const mospt_records *records, uint32_t count, void *work, prep_subtree *out,
                 mospt_err *err);
+
+/* The same by all workers: for many points.
+ * threads  that of the workers */
+bool prep_solve_shared(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
+                       uint32_t level, const mospt_records *records, uint32_t count, void *work,
+                       prep_subtree *out, mospt_err *err);
 
 /* Makes one node of all the given points.
  * child_mask  octants that have a child; no two of the points in such an octant share a finest cell

@@ -1,9 +1,23 @@
 #include "preprocess/sort.h"
 
+#include <stdlib.h>
 #include <string.h>
 
-/* Radix sort, least digit first. 11 bits: few digits, and counters that fit the first cache. */
-enum { DIGIT_BITS = 11, DIGITS_MAX = 6, VALUES = 1 << DIGIT_BITS, FEW = 64 };
+/* Many keys are split by their highest digit until a part fits the second cache together with its
+ * spare; a part is sorted by its lowest digit first, and few keys by comparing. */
+enum {
+    FEW = 32,
+    SPLIT_BITS = 8,
+    SPLIT_VALUES = 1 << SPLIT_BITS,
+    CACHED_MAX = 1 << 15,
+    DIGIT_BITS = 11,
+    DIGITS_MAX = 6,
+    SMALL = 2048, /* keys for which smaller digits, whose counters are cleared sooner, do */
+    SMALL_DIGIT_BITS = 8,
+    SMALL_DIGITS_MAX = 8,
+    COUNTERS = DIGITS_MAX << DIGIT_BITS,
+    SLICE = 1 << 16, /* keys that are one job */
+};
 /* Records that are fetched before their turn, where keys have been sorted before and they stand
  * anywhere. */
 enum { AHEAD = 16 };
@@ -19,16 +33,37 @@ static void sort_few(uint64_t *keys, uint32_t count, uint32_t low_bit)
     }
 }
 
-static uint32_t digit_of(uint64_t key, uint32_t shift)
+/* Bits in which some of the keys differ from `first`. */
+static uint64_t differences(const uint64_t *keys, uint32_t count, uint64_t first)
 {
-    return (uint32_t)(key >> shift) & (VALUES - 1);
+    uint64_t any = 0;
+    for (uint32_t i = 0; i < count; i++)
+        any |= keys[i] ^ first;
+    return any;
+}
+
+static uint32_t highest_bit(uint64_t v)
+{
+    return 63 - (uint32_t)__builtin_clzll(v);
+}
+
+/* Where a digit of SPLIT_BITS begins whose highest bit is that of `any`. */
+static uint32_t split_shift(uint64_t any, uint32_t low_bit)
+{
+    uint32_t high = highest_bit(any) + 1;
+    return high >= low_bit + SPLIT_BITS ? high - SPLIT_BITS : low_bit;
+}
+
+static uint32_t split_digit(uint64_t key, uint32_t shift)
+{
+    return (uint32_t)(key >> shift) & (SPLIT_VALUES - 1);
 }
 
 /* Counts into places; false if all keys are alike in this digit. */
-static bool make_places(uint32_t *counts, uint32_t alike, uint32_t count)
+static bool make_places(uint32_t *counts, uint32_t values, uint32_t alike, uint32_t count)
 {
     if (counts[alike] == count) return false;
-    for (uint32_t v = 0, sum = 0; v < VALUES; v++) {
+    for (uint32_t v = 0, sum = 0; v < values; v++) {
         uint32_t n = counts[v];
         counts[v] = sum;
         sum += n;
@@ -36,32 +71,58 @@ static bool make_places(uint32_t *counts, uint32_t alike, uint32_t count)
     return true;
 }
 
-void prep_sort_keys(uint64_t *keys, uint64_t *spare, uint32_t count, uint32_t low_bit)
+/* Least digit first. Returns true if the result is in `other`. */
+static bool sort_by_digits(uint64_t *keys, uint64_t *other, uint32_t count, uint32_t low_bit,
+                           uint32_t end_bit)
 {
-    uint32_t place[DIGITS_MAX][VALUES];
-    uint64_t *from = keys, *to = spare, any = 0;
-    uint32_t digits = 0;
-    if (count < FEW) {
-        sort_few(keys, count, low_bit);
-        return;
-    }
-    for (uint32_t i = 1; i < count; i++)
-        any |= keys[i] ^ keys[0];
-    while (low_bit + digits * DIGIT_BITS < 64 && any >> (low_bit + digits * DIGIT_BITS) != 0)
-        digits++;
-    memset(place, 0, digits * sizeof place[0]);
+    uint32_t place[COUNTERS], digit_bits = count < SMALL ? SMALL_DIGIT_BITS : DIGIT_BITS,
+                              values = 1u << digit_bits, mask = values - 1;
+    uint32_t digits = (end_bit - low_bit + digit_bits - 1) / digit_bits;
+    uint64_t *from = keys, *to = other;
+    memset(place, 0, digits * values * sizeof *place);
     for (uint32_t i = 0; i < count; i++)
         for (uint32_t d = 0; d < digits; d++)
-            place[d][digit_of(keys[i], low_bit + d * DIGIT_BITS)]++;
+            place[d * values + (uint32_t)(keys[i] >> (low_bit + d * digit_bits) & mask)]++;
     for (uint32_t d = 0; d < digits; d++) {
-        uint32_t shift = low_bit + d * DIGIT_BITS;
-        if (!make_places(place[d], digit_of(from[0], shift), count)) continue;
+        uint32_t shift = low_bit + d * digit_bits, *at = place + d * values;
+        if (!make_places(at, values, (uint32_t)(from[0] >> shift & mask), count)) continue;
         for (uint32_t i = 0; i < count; i++)
-            to[place[d][digit_of(from[i], shift)]++] = from[i];
+            to[at[from[i] >> shift & mask]++] = from[i];
         uint64_t *swap = from;
         from = to, to = swap;
     }
-    if (from != keys) memcpy(keys, from, count * sizeof *keys);
+    return from == other;
+}
+
+/* Sorts keys, into `other` or in place; the other of the two holds nothing then. */
+static void sort_part(uint64_t *keys, uint64_t *other, uint32_t count, uint32_t low_bit,
+                      bool into_other)
+{
+    uint64_t any = count < FEW ? 0 : differences(keys, count, keys[0]);
+    bool in_other = false;
+    if (count < FEW) {
+        sort_few(keys, count, low_bit);
+    } else if (any >> low_bit != 0 && count <= CACHED_MAX) {
+        in_other = sort_by_digits(keys, other, count, low_bit, highest_bit(any) + 1);
+    } else if (any >> low_bit != 0) {
+        uint32_t place[SPLIT_VALUES] = {0}, begin = 0, shift = split_shift(any, low_bit);
+        for (uint32_t i = 0; i < count; i++)
+            place[split_digit(keys[i], shift)]++;
+        make_places(place, SPLIT_VALUES, 0, UINT32_MAX);
+        for (uint32_t i = 0; i < count; i++)
+            other[place[split_digit(keys[i], shift)]++] = keys[i];
+        for (uint32_t v = 0; v < SPLIT_VALUES; begin = place[v++])
+            sort_part(other + begin, keys + begin, place[v] - begin, low_bit, !into_other);
+        return;
+    }
+    if (in_other == into_other) return;
+    if (into_other) memcpy(other, keys, count * sizeof *keys);
+    else memcpy(keys, other, count * sizeof *keys);
+}
+
+void prep_sort_keys(uint64_t *keys, uint64_t *spare, uint32_t count, uint32_t low_bit)
+{
+    sort_part(keys, spare, count, low_bit, false);
 }
 
 void prep_sort_begin(prep_sorter *s, uint64_t *keys, uint32_t count)
@@ -75,8 +136,8 @@ void prep_sort_begin(prep_sorter *s, uint64_t *keys, uint32_t count)
         keys[i] = i;
 }
 
-void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint64_t *spare,
-                     uint32_t count)
+/* Gives keys the cells of the levels below `level`. */
+static void find_cells(const prep_sorter *s, uint32_t level, uint64_t *keys, uint32_t count)
 {
     uint32_t bits = mospt_cell_bits(s->grid, level);
     for (uint32_t i = 0; i < count; i++) {
@@ -87,5 +148,107 @@ void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint6
         mospt_vertex v = mospt_vertex_of(mospt_records_at(s->records, index));
         keys[i] = mospt_cell_code(v.x, v.y, v.z, bits, s->code_levels) << s->index_bits | index;
     }
-    prep_sort_keys(keys, spare, count, s->index_bits);
+}
+
+void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint64_t *spare,
+                     uint32_t count)
+{
+    find_cells(s, level, keys, count);
+    sort_part(keys, spare, count, s->index_bits, false);
+}
+
+/* The first split, done by all workers. */
+typedef struct {
+    const prep_sorter *sorter;
+    uint32_t level, count, shift;
+    uint64_t *keys, *spare;
+    struct slice {
+        uint64_t any, all;            /* bits that some keys have, and that all have */
+        uint32_t place[SPLIT_VALUES]; /* where its keys of each digit go */
+    } * slices;                       /* [count / SLICE rounded up], owned */
+    uint32_t end[SPLIT_VALUES];       /* of the keys of each digit */
+} split;
+
+static uint32_t slice_count(const split *s)
+{
+    return s->count / SLICE + (s->count % SLICE > 0);
+}
+
+static uint64_t *slice_keys(const split *s, uint32_t slice, uint32_t *count)
+{
+    uint32_t begin = slice * SLICE, left = s->count - begin;
+    *count = left < SLICE ? left : SLICE;
+    return s->keys + begin;
+}
+
+static void find_slice(void *context, uint32_t slice)
+{
+    split *s = context;
+    uint32_t count;
+    uint64_t *keys = slice_keys(s, slice, &count), any = 0, all = UINT64_MAX;
+    find_cells(s->sorter, s->level, keys, count);
+    for (uint32_t i = 0; i < count; i++)
+        any |= keys[i], all &= keys[i];
+    s->slices[slice].any = any;
+    s->slices[slice].all = all;
+}
+
+static void count_slice(void *context, uint32_t slice)
+{
+    split *s = context;
+    uint32_t count, *counts = s->slices[slice].place;
+    const uint64_t *keys = slice_keys(s, slice, &count);
+    for (uint32_t i = 0; i < count; i++)
+        counts[split_digit(keys[i], s->shift)]++;
+}
+
+static void move_slice(void *context, uint32_t slice)
+{
+    split *s = context;
+    uint32_t count, *place = s->slices[slice].place;
+    const uint64_t *keys = slice_keys(s, slice, &count);
+    for (uint32_t i = 0; i < count; i++)
+        s->spare[place[split_digit(keys[i], s->shift)]++] = keys[i];
+}
+
+static void sort_digit(void *context, uint32_t digit)
+{
+    split *s = context;
+    uint32_t begin = digit > 0 ? s->end[digit - 1] : 0;
+    sort_part(s->spare + begin, s->keys + begin, s->end[digit] - begin, s->sorter->index_bits,
+              true);
+}
+
+/* Counts into places: digit by digit, and of each the slices in their order. */
+static void place_slices(split *s)
+{
+    uint32_t sum = 0;
+    for (uint32_t v = 0; v < SPLIT_VALUES; s->end[v++] = sum)
+        for (uint32_t i = 0; i < slice_count(s); i++) {
+            uint32_t n = s->slices[i].place[v];
+            s->slices[i].place[v] = sum;
+            sum += n;
+        }
+}
+
+bool prep_sort_below_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
+                            uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err)
+{
+    split s = {.sorter = sorter, .level = level, .count = count, .keys = keys, .spare = spare};
+    uint32_t slices = slice_count(&s);
+    uint64_t any = 0, all = UINT64_MAX;
+    s.slices = calloc(slices, sizeof *s.slices);
+    if (s.slices == NULL) return mospt_err_nomem(err, slices * sizeof *s.slices);
+    prep_workers_run(workers, slices, find_slice, &s);
+    for (uint32_t i = 0; i < slices; i++)
+        any |= s.slices[i].any, all &= s.slices[i].all;
+    if ((any & ~all) >> sorter->index_bits != 0) {
+        s.shift = split_shift(any & ~all, sorter->index_bits);
+        prep_workers_run(workers, slices, count_slice, &s);
+        place_slices(&s);
+        prep_workers_run(workers, slices, move_slice, &s);
+        prep_workers_run(workers, SPLIT_VALUES, sort_digit, &s);
+    }
+    free(s.slices);
+    return true;
 }

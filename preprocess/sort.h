@@ -5,6 +5,7 @@
 #pragma once
 #include "mospt/cell.h"
 #include "mospt/linear.h"
+#include "preprocess/workers.h"
 
 typedef struct {
     const mospt_grid *grid;       /* borrowed */
@@ -22,6 +23,12 @@ void prep_sort_begin(prep_sorter *sorter, uint64_t *keys, uint32_t count);
  * spare    [count], holds nothing before and after */
 void prep_sort_below(const prep_sorter *sorter, uint32_t level, uint64_t *keys, uint64_t *spare,
                      uint32_t count);
+
+/* The same by all workers.
+ * errors   MOSPT_ENOMEM
+ * threads  that of the workers */
+bool prep_sort_below_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
+                            uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err);
 
 /* Sorts keys by their bits from `low_bit` up; keys alike in these keep their order.
  * spare    [count], holds nothing before and after */

@@ -32,7 +32,8 @@ static void load(void)
     void *library = NULL;
     bool ok = true;
 #define FIND(name) ok = ok && find(library, file, #name, &libav.name);
-#define LOAD(library_name, version) library = dlopen(file = FILE_OF(library_name, version), RTLD_LAZY)
+#define LOAD(library_name, version)                                                                \
+    library = dlopen(file = FILE_OF(library_name, version), RTLD_LAZY)
     LOAD("avutil", LIBAVUTIL_VERSION_MAJOR);
     RFILM_AVUTIL(FIND)
     LOAD("avcodec", LIBAVCODEC_VERSION_MAJOR);
