@@ -106,7 +106,7 @@ static int build_to(const cli_options *o, const char *output, bool words, mospt_
     if (!read_scan_options(o, &poses, &options.scans, err)) return EXIT_FAILED;
     /* While a build runs, buffers go back to the system as soon as they are freed: the memory limit
      * is that of the process. A renderer is better served by the allocator's own ways. */
-    mallopt(M_MMAP_THRESHOLD, 64 << 10);
+    mallopt(M_MMAP_THRESHOLD, 256 << 10);
     bool ok = prep_build(&options, &result, err);
     mallopt(M_MMAP_THRESHOLD, 32 << 20);
     prep_pose_list_fini(&poses);
@@ -140,7 +140,7 @@ static int build_each(const cli_options *o)
     prep_pose_list poses;
     prep_build_options options = build_options(o, o->output, &progress);
     if (!read_scan_options(o, &poses, &options.scans, &err)) return fail(&err);
-    mallopt(M_MMAP_THRESHOLD, 64 << 10);
+    mallopt(M_MMAP_THRESHOLD, 256 << 10);
     bool ok = cli_each(&options, on_each, &report, &err);
     prep_pose_list_fini(&poses);
     cli_progress_end(&progress);

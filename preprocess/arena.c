@@ -1,5 +1,7 @@
 #include "preprocess/arena.h"
 
+#include "preprocess/pages.h"
+
 #include <assert.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -13,7 +15,7 @@ typedef struct {
 } piece;
 
 struct prep_arena {
-    uint8_t *memory; /* mapped */
+    uint8_t *memory; /* [size], of prep_pages_take() */
     size_t size;
 
     pthread_mutex_t lock;
@@ -28,14 +30,11 @@ bool prep_arena_create(size_t size, prep_arena **out, mospt_err *err)
     if (a == NULL) return mospt_err_nomem(err, sizeof *a);
     a->size = size;
     if (size > 0) {
-        void *memory = mmap(NULL, size, PROT_READ | PROT_WRITE,
-                            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-        if (memory == MAP_FAILED) {
+        a->memory = prep_pages_take(size);
+        if (a->memory == NULL) {
             free(a);
             return mospt_err_nomem(err, size);
         }
-        madvise(memory, size, MADV_HUGEPAGE); /* only faster, so a refusal does not matter */
-        a->memory = memory;
     }
     pthread_mutex_init(&a->lock, NULL);
     *out = a;
@@ -45,7 +44,7 @@ bool prep_arena_create(size_t size, prep_arena **out, mospt_err *err)
 void prep_arena_destroy(prep_arena *a)
 {
     if (a == NULL) return;
-    if (a->memory != NULL) munmap(a->memory, a->size);
+    prep_pages_give(a->memory, a->size);
     pthread_mutex_destroy(&a->lock);
     free(a->pieces);
     free(a);

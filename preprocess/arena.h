@@ -1,8 +1,7 @@
 /* preprocess/arena.h - a fixed amount of memory, taken in pieces and given back.
  *
  * Pieces come from the lowest gap that is wide enough, so pages that were touched once are used
- * again and the process never holds more than the arena. Fresh pages are huge where the system has
- * such. */
+ * again and the process never holds more than the arena. */
 #pragma once
 #include "mospt/err.h"
 

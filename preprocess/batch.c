@@ -1,5 +1,7 @@
 #include "preprocess/batch.h"
 
+#include "preprocess/pages.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,7 +32,8 @@ void prep_batch_fini(prep_batch *batch)
     free(batch->rgbi);
     for (uint32_t k = 0; k < batch->plane_count; k++)
         free(batch->plane[k]);
-    free(batch->packed.records), free(batch->packed.layout);
+    prep_pages_give(batch->packed.records, batch->packed.size);
+    free(batch->packed.layout);
     *batch = (prep_batch){0};
 }
 
@@ -46,24 +49,24 @@ prep_places prep_batch_places(const prep_batch *batch)
     return places;
 }
 
-static bool reserve(void **memory, size_t *size, size_t wanted, mospt_err *err)
+static bool reserve_records(prep_packed *p, size_t wanted, mospt_err *err)
 {
-    if (*size >= wanted) return true;
-    free(*memory);
-    *memory = malloc(wanted);
-    *size = *memory != NULL ? wanted : 0;
-    return *memory != NULL || mospt_err_nomem(err, wanted);
+    if (p->size >= wanted) return true;
+    prep_pages_give(p->records, p->size);
+    p->records = prep_pages_take(wanted);
+    p->size = p->records != NULL ? wanted : 0;
+    return p->records != NULL || mospt_err_nomem(err, wanted);
 }
 
 bool prep_batch_take_packed(prep_batch *batch, prep_unpack *unpack, size_t stride,
                             const void *layout, size_t layout_size, mospt_err *err)
 {
     prep_packed *p = &batch->packed;
-    void *records = p->records;
-    bool ok = reserve(&records, &p->size, batch->capacity * stride, err);
-    p->records = records;
-    if (!ok || !reserve(&p->layout, &p->layout_size, layout_size, err)) return false;
-    memcpy(p->layout, layout, layout_size);
+    void *copy = realloc(p->layout, layout_size);
+    if (copy == NULL) return mospt_err_nomem(err, layout_size);
+    p->layout = copy;
+    memcpy(copy, layout, layout_size);
+    if (!reserve_records(p, batch->capacity * stride, err)) return false;
     p->stride = stride;
     p->unpack = unpack;
     p->has_lattice = false;

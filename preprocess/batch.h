@@ -23,10 +23,9 @@ typedef void prep_unpack(const void *layout, const uint8_t *records, uint32_t co
  * needed, instead of on the one that reads. */
 typedef struct {
     prep_unpack *unpack; /* NULL: the batch holds its points in planes */
-    uint8_t *records;    /* [capacity of the batch][stride], owned */
-    size_t size, stride; /* bytes that are allocated, bytes of a record */
-    void *layout;        /* owned, [layout_size] */
-    size_t layout_size;
+    uint8_t *records;    /* [capacity of the batch][stride], owned, of prep_pages_take() */
+    size_t size, stride; /* bytes that are taken, bytes of a record */
+    void *layout;        /* owned */
     bool has_lattice; /* records begin with x, y, z as int32, little endian; x * scale + offset is
                          a world coordinate */
     double scale[3], offset[3];

@@ -2,6 +2,7 @@
 
 #include "preprocess/feed.h"
 #include "preprocess/large_node.h"
+#include "preprocess/pages.h"
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -36,10 +37,13 @@ typedef struct {
     mospt_err err; /* of the first failure */
 } line;
 
+/* Points of a rejection file that all threads solve together. */
+enum { SHARED_MIN = 1 << 20 };
+
 /* One thread's memory for the payload of a node; of a large one it is given back at once. */
 enum { BUFFER_KEPT_SIZE = 8 << 20 };
 typedef struct {
-    void *memory; /* [size], owned */
+    void *memory; /* [size], owned, of prep_pages_take() */
     size_t size;
 } buffer;
 
@@ -141,7 +145,8 @@ static bool collect_records(const prep_pass_env *env, item *i, uint8_t *to, mosp
     return true;
 }
 
-static bool solve_item(const prep_pass_env *env, item *i, mospt_err *err)
+/* shared   all threads solve it together */
+static bool solve_item(const prep_pass_env *env, item *i, bool shared, mospt_err *err)
 {
     const prep_finish_part *part = i->part;
     uint32_t count = (uint32_t)i->count;
@@ -153,6 +158,9 @@ static bool solve_item(const prep_pass_env *env, item *i, mospt_err *err)
     if (part->is_node)
         return prep_solve_node(env->shape, part->corner, part->level, part->child_mask, &i->records,
                                count, i->memory, &i->made, err);
+    if (shared)
+        return prep_solve_shared(env->shape, env->workers, part->corner, part->level, &i->records,
+                                 count, i->memory, &i->made, err);
     return prep_solve(env->shape, part->corner, part->level, &i->records, count, i->memory,
                       &i->made, err);
 }
@@ -179,6 +187,12 @@ static bool place_solved(line *l, mospt_err *err)
     return true;
 }
 
+static void drop_buffer(buffer *b)
+{
+    prep_pages_give(b->memory, b->size);
+    *b = (buffer){0};
+}
+
 static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, uint64_t *hash,
                       mospt_err *err)
 {
@@ -188,17 +202,16 @@ static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, 
     }
     size_t size = prep_solve_emit_size(env->shape, i->made.nodes[n].node.count);
     if (size > b->size) {
-        free(b->memory);
-        b->memory = malloc(size);
-        b->size = b->memory != NULL ? size : 0;
+        drop_buffer(b);
+        /* What is not touched takes no room. */
+        if (size < BUFFER_KEPT_SIZE) size = BUFFER_KEPT_SIZE;
+        b->memory = prep_pages_take(size);
         if (b->memory == NULL) return mospt_err_nomem(err, size);
+        b->size = size;
     }
     *hash = prep_solve_emit(env->shape, &i->records, &i->made, n, b->memory);
     bool ok = mospt_writer_write(env->writer, &i->made.nodes[n].node, b->memory, err);
-    if (b->size > BUFFER_KEPT_SIZE) {
-        free(b->memory);
-        *b = (buffer){0};
-    }
+    if (b->size > BUFFER_KEPT_SIZE) drop_buffer(b);
     return ok;
 }
 
@@ -262,7 +275,7 @@ static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
         *ok = *ok && settle_node(l, i, n, hash, err);
     } else if (solving != NULL) {
         pthread_mutex_unlock(&l->lock);
-        *ok = solve_item(l->env, solving, err);
+        *ok = solve_item(l->env, solving, false, err);
         pthread_mutex_lock(&l->lock);
         solving->is_solved = *ok;
         *ok = *ok && place_solved(l, err);
@@ -293,11 +306,20 @@ static void work_on_line(void *context, uint32_t thread)
     }
     pthread_cond_broadcast(&l->change);
     pthread_mutex_unlock(&l->lock);
-    free(b.memory);
+    drop_buffer(&b);
 }
 
-static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts,
-                         uint32_t part_count, mospt_err *err)
+/* What all threads solve together comes alone. */
+static bool solve_shared(line *l)
+{
+    item *i = next_to_solve(l);
+    i->is_solved = solve_item(l->env, i, true, &l->err);
+    return i->is_solved && place_solved(l, &l->err);
+}
+
+/* shared   solve the one part with all threads */
+static bool finish_in_memory(const prep_pass_env *env, const prep_finish_part *parts,
+                             uint32_t part_count, bool shared, mospt_err *err)
 {
     line l = {.env = env, .item_count = part_count};
     if (part_count == 0) return true;
@@ -308,7 +330,9 @@ static bool finish_small(const prep_pass_env *env, const prep_finish_part *parts
             .part = &parts[i], .count = count_of(&parts[i]), .kept = find_kept(env, &parts[i])};
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
-    prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
+    l.failed = shared && !solve_shared(&l);
+    if (!l.failed)
+        prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
     pthread_cond_destroy(&l.change);
     pthread_mutex_destroy(&l.lock);
     for (uint32_t i = 0; i < part_count; i++)
@@ -335,15 +359,17 @@ bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_e
     uint32_t begin = 0;
     for (uint32_t i = 0; i < list->part_count; i++) {
         const prep_finish_part *part = &list->parts[i];
-        bool fits = count_of(part) <= env->solve_points ||
-                    (part->is_node && env->shape->inner_depth == MOSPT_DEPTH_MIN);
-        if (fits || find_kept(env, part) != MOSPT_NO_NODE) continue;
-        if (!finish_small(env, list->parts + begin, i - begin, err) ||
-            !finish_large(env, part, err))
-            return false;
+        uint64_t count = count_of(part);
+        bool is_large = count > env->solve_points &&
+                        !(part->is_node && env->shape->inner_depth == MOSPT_DEPTH_MIN),
+             is_shared = !part->is_node && count >= SHARED_MIN;
+        if ((!is_large && !is_shared) || find_kept(env, part) != MOSPT_NO_NODE) continue;
+        if (!finish_in_memory(env, list->parts + begin, i - begin, false, err)) return false;
+        if (is_large && !finish_large(env, part, err)) return false;
+        if (!is_large && !finish_in_memory(env, part, 1, true, err)) return false;
         begin = i + 1;
     }
-    return finish_small(env, list->parts + begin, list->part_count - begin, err);
+    return finish_in_memory(env, list->parts + begin, list->part_count - begin, false, err);
 }
 
 /* Makes one node of a pile and writes it.

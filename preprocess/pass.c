@@ -1,6 +1,7 @@
 #include "preprocess/pass.h"
 
 #include "preprocess/finish.h"
+#include "preprocess/pages.h"
 
 #include <stdlib.h>
 
@@ -10,7 +11,7 @@ enum { OCTANTS = 8 };
 typedef struct {
     uint8_t kept;   /* bit for each level, and one more for what goes below: these points are in the
                        dataset already, and are only counted */
-    uint8_t *cells; /* owned bit sets of its finest cells, one per level; NULL: untouched */
+    uint8_t *cells; /* bit sets of its finest cells, one per level; NULL: untouched */
     prep_spool accepted[PREP_PASS_LEVELS_MAX];
     prep_spool rejected;
     mospt_err err;
@@ -19,11 +20,14 @@ typedef struct {
 /* Records on their way into the buckets, slice by slice. */
 typedef struct {
     uint32_t slice_count;
-    uint8_t *records; /* [batch_slices][PREP_PASS_SLICE][stride], owned */
-    uint32_t *codes;  /* [batch_slices][PREP_PASS_SLICE], owned */
-    uint16_t *order;  /* [batch_slices][PREP_PASS_SLICE], owned: those of each bucket, in turn */
-    uint16_t *begin;  /* [batch_slices][bucket_count + 1], owned: part of each bucket in that */
-    uint32_t *touched, touched_count; /* [bucket_count], owned: buckets with records */
+    void *memory; /* owned, of prep_pages_take(), for all that follows */
+    size_t size;
+    uint32_t *codes;   /* [batch_slices][PREP_PASS_SLICE] */
+    uint32_t *touched; /* [bucket_count]: buckets with records */
+    uint32_t touched_count;
+    uint16_t *order;  /* [batch_slices][PREP_PASS_SLICE]: those of each bucket, in turn */
+    uint16_t *begin;  /* [batch_slices][bucket_count + 1]: part of each bucket in that */
+    uint8_t *records; /* [batch_slices][PREP_PASS_SLICE][stride] */
 } batch;
 
 struct prep_pass {
@@ -37,6 +41,7 @@ struct prep_pass {
     size_t cells_offset[PREP_PASS_LEVELS_MAX]; /* of each level in them, bytes */
     uint32_t bucket_count;
     bucket *buckets; /* [bucket_count], owned */
+    uint8_t *cells;  /* [bucket_count][cells_size], owned, of prep_pages_take() */
     prep_spool pile;
     batch batches[2];
     batch *prepared; /* the next to go into the buckets; NULL: none */
@@ -65,22 +70,35 @@ size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth)
 
 static bool batch_init(const prep_pass *p, batch *b, mospt_err *err)
 {
-    size_t records = (size_t)p->env->batch_slices * PREP_PASS_SLICE;
-    b->records = malloc(records * p->stride);
-    b->codes = malloc(records * sizeof *b->codes);
-    b->order = malloc(records * sizeof *b->order);
-    b->begin = malloc((size_t)p->env->batch_slices * (p->bucket_count + 1) * sizeof *b->begin);
-    b->touched = malloc(p->bucket_count * sizeof *b->touched);
-    if (b->records != NULL && b->codes != NULL && b->order != NULL && b->begin != NULL &&
-        b->touched != NULL)
-        return true;
-    return mospt_err_nomem(err, records * p->stride);
+    size_t records = (size_t)p->env->batch_slices * PREP_PASS_SLICE,
+           parts = (size_t)p->env->batch_slices * (p->bucket_count + 1);
+    b->size = records * (sizeof *b->codes + sizeof *b->order + p->stride) +
+              p->bucket_count * sizeof *b->touched + parts * sizeof *b->begin;
+    b->memory = prep_pages_take(b->size);
+    if (b->memory == NULL) return mospt_err_nomem(err, b->size);
+    b->codes = b->memory;
+    b->touched = b->codes + records;
+    b->order = (uint16_t *)(b->touched + p->bucket_count);
+    b->begin = b->order + records;
+    b->records = (uint8_t *)(b->begin + parts);
+    return true;
 }
 
 static void batch_fini(batch *b)
 {
-    free(b->records), free(b->codes), free(b->order), free(b->begin), free(b->touched);
+    prep_pages_give(b->memory, b->size);
     *b = (batch){0};
+}
+
+static size_t cells_total(const prep_pass *p)
+{
+    return p->bucket_count * p->cells_size;
+}
+
+static void drop_cells(prep_pass *p)
+{
+    prep_pages_give(p->cells, cells_total(p));
+    p->cells = NULL;
 }
 
 bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
@@ -109,6 +127,10 @@ bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_
     }
     p->buckets = calloc(p->bucket_count, sizeof *p->buckets);
     bool ok = p->buckets != NULL || mospt_err_nomem(err, p->bucket_count * sizeof *p->buckets);
+    if (ok && p->levels > 0 && !env->divides) {
+        p->cells = prep_pages_take(cells_total(p));
+        ok = p->cells != NULL || mospt_err_nomem(err, cells_total(p));
+    }
     for (int b = 0; ok && b < 2; b++)
         ok = batch_init(p, &p->batches[b], err);
     if (ok) *out = p;
@@ -120,7 +142,6 @@ void prep_pass_abandon(prep_pass *p)
 {
     if (p == NULL) return;
     for (uint32_t b = 0; p->buckets != NULL && b < p->bucket_count; b++) {
-        free(p->buckets[b].cells);
         for (uint32_t j = 0; j < p->levels; j++)
             prep_spool_drop(p->env->store, &p->buckets[b].accepted[j]);
         prep_spool_drop(p->env->store, &p->buckets[b].rejected);
@@ -128,6 +149,7 @@ void prep_pass_abandon(prep_pass *p)
     prep_spool_drop(p->env->store, &p->pile);
     for (int b = 0; b < 2; b++)
         batch_fini(&p->batches[b]);
+    drop_cells(p);
     free(p->buckets);
     free(p);
 }
@@ -228,11 +250,7 @@ static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
     size_t stride = p->stride;
     if (!p->env->divides && to->cells == NULL) {
         to->kept = find_kept(p, b);
-        to->cells = calloc(1, p->cells_size);
-        if (to->cells == NULL) {
-            mospt_err_nomem(&to->err, p->cells_size);
-            return;
-        }
+        to->cells = p->cells + b * p->cells_size;
     }
     for (uint32_t s = 0; s < from->slice_count; s++) {
         const uint8_t *records = records_of(p, from, s);
@@ -369,9 +387,8 @@ static void list_nodes(prep_pass *p, uint32_t j, const uint32_t corner[3], uint3
 
 static bool seal_buckets(prep_pass *p, mospt_err *err)
 {
+    drop_cells(p);
     for (uint32_t b = 0; b < p->bucket_count; b++) {
-        free(p->buckets[b].cells);
-        p->buckets[b].cells = NULL;
         for (uint32_t j = 0; j < p->levels; j++)
             if (!prep_spool_seal(p->env->store, &p->buckets[b].accepted[j], err)) return false;
         if (!prep_spool_seal(p->env->store, &p->buckets[b].rejected, err)) return false;

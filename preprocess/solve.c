@@ -4,7 +4,11 @@
 
 #include <stdlib.h>
 
-enum { OCTANTS = 8 };
+enum {
+    OCTANTS = 8,
+    PIECES_MAX = OCTANTS * OCTANTS,
+    SHARED_MIN = 1 << 18, /* points that all threads divide together */
+};
 
 /* Keys go back and forth between two arrays: what a node keeps stays where it was put, and what it
  * rejects, octant by octant behind it, goes on in the other array. So all that belongs to a subtree
@@ -23,11 +27,17 @@ typedef struct {
     uint32_t side;         /* which array they are in, sorted */
 } part;
 
-/* What becomes of a part. */
+/* What becomes of a part, piece by piece: an octant, or a cell below it. */
 typedef struct {
-    uint32_t cell_shift, octant_shift; /* in its keys */
-    uint32_t kept;                     /* points that its node keeps */
-    uint32_t rejected[OCTANTS];        /* 0: the octant is added */
+    const solver *s;
+    const part *p;
+    uint32_t cell_shift, piece_shift; /* in its keys */
+    uint32_t pieces, pieces_per_octant;
+    uint32_t begin[PIECES_MAX + 1]; /* in the keys of the part */
+    uint32_t taken[PIECES_MAX];     /* points that find their finest cell taken */
+    uint32_t kept_at[PIECES_MAX], rest_at[PIECES_MAX]; /* where its points go in the room */
+    uint32_t kept;                                     /* points that the node keeps */
+    uint32_t rejected[OCTANTS];                        /* 0: the octant is added */
 } division;
 
 void prep_subtree_fini(prep_subtree *subtree)
@@ -115,13 +125,14 @@ static bool solve_pile(const solver *s, part p, prep_subtree *made, mospt_err *e
     return true;
 }
 
-/* Where the keys end that are alike above `shift` to the first one. */
-static uint32_t run_end(const uint64_t *keys, uint32_t count, uint32_t shift)
+/* How many of the keys come before the piece. */
+static uint32_t count_before(const division *d, uint32_t piece)
 {
-    uint32_t low = 1, high = count;
+    const uint64_t *keys = keys_of(d->s, d->p);
+    uint32_t low = 0, high = d->p->count;
     while (low < high) {
         uint32_t middle = low + (high - low) / 2;
-        if (keys[middle] >> shift == keys[0] >> shift) low = middle + 1;
+        if ((keys[middle] >> d->piece_shift & (d->pieces - 1)) < piece) low = middle + 1;
         else high = middle;
     }
     return low;
@@ -137,11 +148,10 @@ static uint32_t count_rejected(const uint64_t *keys, uint32_t count, uint32_t ce
 }
 
 /* Sends the first point that arrived in each cell to `kept`, and the others, in their order, to
- * `rejected`. Returns how many are kept. */
-static uint32_t reject(const solver *s, const uint64_t *keys, uint32_t count, uint32_t cell_shift,
-                       uint64_t *kept, uint64_t *rejected)
+ * `rejected`. */
+static void reject(const solver *s, const uint64_t *keys, uint32_t count, uint32_t cell_shift,
+                   uint64_t *kept, uint64_t *rejected)
 {
-    uint32_t cells = 0;
     for (uint32_t a = 0, b; a < count; a = b) {
         uint64_t cell = keys[a] >> cell_shift, first_key = keys[a];
         uint32_t first = a;
@@ -150,78 +160,95 @@ static uint32_t reject(const solver *s, const uint64_t *keys, uint32_t count, ui
             first = earlier ? b : first;
             first_key = earlier ? keys[b] : first_key;
         }
-        kept[cells++] = first_key;
+        *kept++ = first_key;
         for (uint32_t i = a; i < first; i++)
             *rejected++ = keys[i];
         for (uint32_t i = first + 1; i < b; i++)
             *rejected++ = keys[i];
     }
-    return cells;
 }
 
-static uint32_t octant_of(const division *d, uint64_t key)
+/* levels   below the part at which its pieces are cells */
+static void begin_division(const solver *s, const part *p, uint32_t levels, division *d)
 {
-    return (uint32_t)(key >> d->octant_shift) & (OCTANTS - 1);
+    uint32_t left = s->sorter.code_levels - (p->level - p->base), index_bits = s->sorter.index_bits;
+    *d = (division){.s = s,
+                    .p = p,
+                    .cell_shift = index_bits + 3 * (left - s->shape->inner_depth),
+                    .piece_shift = index_bits + 3 * (left - levels),
+                    .pieces = 1u << 3 * levels,
+                    .pieces_per_octant = 1u << 3 * (levels - 1)};
+    for (uint32_t i = 0; i <= d->pieces; i++)
+        d->begin[i] = i < d->pieces ? count_before(d, i) : p->count;
 }
 
-static division begin_division(const solver *s, const part *p)
+static uint32_t octant_size(const division *d, uint32_t octant)
 {
-    uint32_t left = s->sorter.code_levels - (p->level - p->base);
-    return (division){.cell_shift = s->sorter.index_bits + 3 * (left - s->shape->inner_depth),
-                      .octant_shift = s->sorter.index_bits + 3 * (left - 1)};
+    return d->begin[(octant + 1) * d->pieces_per_octant] - d->begin[octant * d->pieces_per_octant];
 }
 
-/* Which octants reject, and how much. */
-static void decide(const solver *s, const part *p, division *d)
+/* Job. */
+static void count_piece(void *context, uint32_t piece)
 {
-    const uint64_t *keys = keys_of(s, p);
-    d->kept = p->count;
-    for (uint32_t a = 0, n; a < p->count; a += n) {
-        n = run_end(keys + a, p->count - a, d->octant_shift);
-        uint32_t more =
-            n < s->shape->add_threshold ? 0 : count_rejected(keys + a, n, d->cell_shift);
-        if (more < s->shape->add_threshold) continue;
-        d->rejected[octant_of(d, keys[a])] = more;
-        d->kept -= more;
+    division *d = context;
+    if (octant_size(d, piece / d->pieces_per_octant) < d->s->shape->add_threshold) return;
+    d->taken[piece] = count_rejected(keys_of(d->s, d->p) + d->begin[piece],
+                                     d->begin[piece + 1] - d->begin[piece], d->cell_shift);
+}
+
+/* Which octants reject; what each piece keeps then, and where all of it goes. */
+static void place_pieces(division *d)
+{
+    uint32_t kept = 0, rest = 0;
+    for (uint32_t i = 0; i < d->pieces; i++)
+        d->rejected[i / d->pieces_per_octant] += d->taken[i];
+    for (uint32_t o = 0; o < OCTANTS; o++)
+        if (d->rejected[o] < d->s->shape->add_threshold) d->rejected[o] = 0;
+    for (uint32_t i = 0; i < d->pieces; i++) {
+        uint32_t rejected = d->rejected[i / d->pieces_per_octant] > 0 ? d->taken[i] : 0;
+        d->kept_at[i] = kept;
+        d->rest_at[i] = rest;
+        kept += d->begin[i + 1] - d->begin[i] - rejected;
+        rest += rejected;
     }
+    d->kept = kept;
 }
 
-/* Moves the keys to where they go. */
-static void divide(const solver *s, const part *p, const division *d)
+/* Job. */
+static void move_piece(void *context, uint32_t piece)
 {
-    const uint64_t *keys = keys_of(s, p);
-    uint64_t *kept = room_of(s, p), *rejected = kept + d->kept;
-    for (uint32_t a = 0, n; a < p->count; a += n) {
-        uint32_t more = d->rejected[octant_of(d, keys[a])];
-        n = run_end(keys + a, p->count - a, d->octant_shift);
-        if (more > 0) reject(s, keys + a, n, d->cell_shift, kept, rejected);
-        else memcpy(kept, keys + a, n * sizeof *keys);
-        kept += n - more, rejected += more;
-    }
+    division *d = context;
+    const uint64_t *keys = keys_of(d->s, d->p) + d->begin[piece];
+    uint64_t *room = room_of(d->s, d->p), *kept = room + d->kept_at[piece],
+             *rest = room + d->kept + d->rest_at[piece];
+    uint32_t count = d->begin[piece + 1] - d->begin[piece];
+    if (d->rejected[piece / d->pieces_per_octant] > 0)
+        reject(d->s, keys, count, d->cell_shift, kept, rest);
+    else memcpy(kept, keys, count * sizeof *keys);
 }
 
 /* Makes the node of a part that is divided, and lists the parts below it.
- * below    out, [OCTANTS]
- * returns  how many there are; UINT32_MAX: failed */
-static uint32_t settle(const solver *s, const part *p, const division *d, part *below,
-                       prep_subtree *made, mospt_err *err)
+ * below    out, [OCTANTS] */
+static bool settle(const division *d, part *below, uint32_t *count, prep_subtree *made,
+                   mospt_err *err)
 {
+    const part *p = d->p;
     uint8_t child_mask = 0;
-    uint32_t count = 0, first = p->first + d->kept;
+    uint32_t first = p->first + d->kept;
+    *count = 0;
     for (uint32_t o = 0; o < OCTANTS; o++) {
         if (d->rejected[o] == 0) continue;
+        part *child = &below[(*count)++];
         child_mask |= (uint8_t)(1u << o);
-        below[count] = *p;
-        mospt_cell_child(s->shape->grid, p->corner, p->level, o, below[count].corner);
-        below[count].level++;
-        below[count].first = first;
-        below[count].count = d->rejected[o];
-        below[count++].side = 1 - p->side;
+        *child = (part){.level = p->level + 1,
+                        .base = p->base,
+                        .first = first,
+                        .count = d->rejected[o],
+                        .side = 1 - p->side};
+        mospt_cell_child(d->s->shape->grid, p->corner, p->level, o, child->corner);
         first += d->rejected[o];
     }
-    if (!keep(s, p, child_mask, d->cell_shift, room_of(s, p), d->kept, made, err))
-        return UINT32_MAX;
-    return count;
+    return keep(d->s, p, child_mask, d->cell_shift, room_of(d->s, p), d->kept, made, err);
 }
 
 static bool is_pile(const solver *s, const part *p)
@@ -243,12 +270,16 @@ static bool solve_part(const solver *s, part p, prep_subtree *made, mospt_err *e
         p.base = p.level;
         prep_sort_below(&s->sorter, p.level, keys_of(s, &p), room_of(s, &p), p.count);
     }
-    division d = begin_division(s, &p);
-    decide(s, &p, &d);
-    divide(s, &p, &d);
-    uint32_t n = settle(s, &p, &d, below, made, err);
-    bool ok = n != UINT32_MAX;
-    for (uint32_t i = 0; ok && i < n; i++)
+    division d;
+    begin_division(s, &p, 1, &d);
+    for (uint32_t i = 0; i < d.pieces; i++)
+        count_piece(&d, i);
+    place_pieces(&d);
+    for (uint32_t i = 0; i < d.pieces; i++)
+        move_piece(&d, i);
+    uint32_t count;
+    bool ok = settle(&d, below, &count, made, err);
+    for (uint32_t i = 0; ok && i < count; i++)
         ok = solve_part(s, below[i], made, err);
     return ok;
 }
@@ -274,6 +305,125 @@ bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t leve
     return ok;
 }
 
+/* A part that one thread solves. */
+typedef struct {
+    part p;
+    prep_subtree made;
+    mospt_err err;
+} task;
+
+/* Parts that all threads divide together, and those that are left for one each. */
+typedef struct {
+    solver s;
+    prep_workers *workers;
+    part *large; /* [large_count], owned */
+    task *tasks; /* [task_count], owned */
+    uint32_t large_count, task_count;
+    prep_subtree made; /* of the large ones */
+} shared;
+
+static bool append(shared *sh, const part *p, mospt_err *err)
+{
+    bool is_large = p->count >= SHARED_MIN && !is_pile(&sh->s, p) && !ends_above(&sh->s, p);
+    if (is_large) {
+        part *large = realloc(sh->large, (sh->large_count + 1) * sizeof *large);
+        if (large == NULL) return mospt_err_nomem(err, sizeof *large);
+        sh->large = large;
+        large[sh->large_count++] = *p;
+    } else {
+        task *tasks = realloc(sh->tasks, (sh->task_count + 1) * sizeof *tasks);
+        if (tasks == NULL) return mospt_err_nomem(err, sizeof *tasks);
+        sh->tasks = tasks;
+        tasks[sh->task_count++] = (task){.p = *p, .made.index_bits = sh->made.index_bits};
+    }
+    return true;
+}
+
+static bool divide_large(shared *sh, mospt_err *err)
+{
+    division d;
+    part p = sh->large[--sh->large_count], below[OCTANTS];
+    uint32_t count;
+    begin_division(&sh->s, &p, sh->s.shape->inner_depth > 1 ? 2 : 1, &d);
+    prep_workers_run(sh->workers, d.pieces, count_piece, &d);
+    place_pieces(&d);
+    prep_workers_run(sh->workers, d.pieces, move_piece, &d);
+    bool ok = settle(&d, below, &count, &sh->made, err);
+    for (uint32_t i = 0; ok && i < count; i++)
+        ok = append(sh, &below[i], err);
+    return ok;
+}
+
+/* Job. */
+static void solve_task(void *context, uint32_t index)
+{
+    shared *sh = context;
+    task *t = &sh->tasks[index];
+    solve_part(&sh->s, t->p, &t->made, &t->err);
+}
+
+/* So that the last ones to end are short. */
+static int largest_first(const void *a, const void *b)
+{
+    const task *x = a, *y = b;
+    return (x->p.count < y->p.count) - (x->p.count > y->p.count);
+}
+
+static int in_order(const void *a, const void *b)
+{
+    const prep_solved *x = a, *y = b;
+    return (x->first > y->first) - (x->first < y->first);
+}
+
+static bool gather_tasks(shared *sh, mospt_err *err)
+{
+    uint32_t count = sh->made.node_count;
+    for (uint32_t i = 0; i < sh->task_count; i++) {
+        if (sh->tasks[i].err.code != MOSPT_OK) {
+            if (err != NULL) *err = sh->tasks[i].err;
+            return false;
+        }
+        count += sh->tasks[i].made.node_count;
+    }
+    prep_solved *nodes = realloc(sh->made.nodes, count * sizeof *nodes);
+    if (nodes == NULL) return mospt_err_nomem(err, count * sizeof *nodes);
+    sh->made.nodes = nodes;
+    sh->made.node_capacity = count;
+    for (uint32_t i = 0; i < sh->task_count; i++) {
+        const prep_subtree *made = &sh->tasks[i].made;
+        memcpy(nodes + sh->made.node_count, made->nodes, made->node_count * sizeof *nodes);
+        sh->made.node_count += made->node_count;
+    }
+    qsort(nodes, count, sizeof *nodes, in_order);
+    return true;
+}
+
+bool prep_solve_shared(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
+                       uint32_t level, const mospt_records *records, uint32_t count, void *work,
+                       prep_subtree *out, mospt_err *err)
+{
+    shared sh = {.workers = workers};
+    solver_init(&sh.s, shape, records, count, work);
+    sh.made.index_bits = sh.s.sorter.index_bits;
+    part p = whole(corner, level, count);
+    bool ok = prep_sort_below_shared(&sh.s.sorter, workers, level, sh.s.keys[0], sh.s.keys[1],
+                                     count, err) &&
+              append(&sh, &p, err);
+    while (ok && sh.large_count > 0)
+        ok = divide_large(&sh, err);
+    if (ok) {
+        if (sh.task_count > 0) qsort(sh.tasks, sh.task_count, sizeof *sh.tasks, largest_first);
+        prep_workers_run(workers, sh.task_count, solve_task, &sh);
+        ok = gather_tasks(&sh, err);
+    }
+    for (uint32_t i = 0; i < sh.task_count; i++)
+        prep_subtree_fini(&sh.tasks[i].made);
+    free(sh.large), free(sh.tasks);
+    if (ok) *out = sh.made;
+    else prep_subtree_fini(&sh.made);
+    return ok;
+}
+
 bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level,
                      uint8_t child_mask, const mospt_records *records, uint32_t count, void *work,
                      prep_subtree *out, mospt_err *err)
@@ -284,8 +434,8 @@ bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t
     made.index_bits = s.sorter.index_bits;
     prep_sort_below(&s.sorter, level, s.keys[0], s.keys[1], count);
     part p = whole(corner, level, count);
-    division d = begin_division(&s, &p);
-    if (!keep(&s, &p, child_mask, d.cell_shift, s.keys[0], count, &made, err)) return false;
+    uint32_t cell_shift = made.index_bits + 3 * (s.sorter.code_levels - shape->inner_depth);
+    if (!keep(&s, &p, child_mask, cell_shift, s.keys[0], count, &made, err)) return false;
     *out = made;
     return true;
 }

@@ -1,6 +1,7 @@
 #include "preprocess/spool.h"
 
 #include "mospt/file.h"
+#include "preprocess/pages.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 /* Memory for blocks comes from the system in slabs of so many bytes, of which only what is touched
@@ -49,10 +49,8 @@ static uint8_t *take_memory(prep_store *s)
         if ((size_t)(s->fresh_end - s->fresh) < s->block_size) {
             size_t size = sizeof(mospt_vertex) + s->block_size;
             if (size < SLAB_SIZE) size = SLAB_SIZE;
-            void *fresh = mmap(NULL, size, PROT_READ | PROT_WRITE,
-                               MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-            if (fresh != MAP_FAILED) {
-                madvise(fresh, size, MADV_HUGEPAGE); /* only faster, a refusal does not matter */
+            void *fresh = prep_pages_take(size);
+            if (fresh != NULL) {
                 *(slab *)fresh = (slab){.next = s->slabs, .size = size};
                 s->slabs = fresh;
                 s->fresh = (uint8_t *)fresh + sizeof(mospt_vertex);
@@ -104,7 +102,7 @@ void prep_store_destroy(prep_store *s)
     if (s->fd >= 0) close(s->fd);
     while (s->slabs != NULL) {
         slab *next = s->slabs->next;
-        munmap(s->slabs, s->slabs->size);
+        prep_pages_give(s->slabs, s->slabs->size);
         s->slabs = next;
     }
     pthread_mutex_destroy(&s->lock);

@@ -14,8 +14,8 @@ static int compare(const void *a, const void *b)
  * where one is not. */
 static bool sort_by_counting(double *values, size_t count)
 {
-    uint32_t *counts = calloc(UINT16_MAX + 1, sizeof *counts);
-    bool fits = counts != NULL;
+    uint16_t counts[UINT16_MAX + 1] = {0};
+    bool fits = count <= UINT16_MAX;
     for (size_t i = 0; fits && i < count; i++) {
         fits = values[i] >= 0 && values[i] <= UINT16_MAX && values[i] == (uint16_t)values[i];
         if (fits) counts[(uint16_t)values[i]]++;
@@ -23,7 +23,6 @@ static bool sort_by_counting(double *values, size_t count)
     for (uint32_t v = 0, out = 0; fits && out < count; v++)
         for (uint32_t i = 0; i < counts[v]; i++)
             values[out++] = v;
-    free(counts);
     return fits;
 }
 
