@@ -130,6 +130,60 @@ static void many_copies_of_few_points_are_solved(void **state)
     check(CORE_COPIES, 32, 80000, 7, PREP_ADD_THRESHOLD);
 }
 
+/* Nodes and the points of each by the indices of their records. */
+static void assert_same_division(const prep_subtree *a, const prep_subtree *b)
+{
+    assert_int_equal(a->node_count, b->node_count);
+    assert_int_equal(a->index_bits, b->index_bits);
+    for (uint32_t n = 0; n < a->node_count; n++) {
+        const prep_solved *x = &a->nodes[n], *y = &b->nodes[n];
+        assert_memory_equal(x->node.corner, y->node.corner, sizeof x->node.corner);
+        assert_int_equal(x->node.level, y->node.level);
+        assert_int_equal(x->node.child_mask, y->node.child_mask);
+        assert_int_equal(x->node.count, y->node.count);
+        assert_int_equal(x->first, y->first);
+        assert_int_equal(x->cell_shift, y->cell_shift);
+        assert_memory_equal(x->keys, y->keys, x->node.count * sizeof *x->keys);
+    }
+}
+
+static void assert_shared_like_alone(core_kind kind, uint32_t bits, uint32_t count, uint32_t depth)
+{
+    core_site site;
+    core_site_make(kind, bits, count, kind, &site);
+    prep_shape shape = core_shape(&site, depth, PREP_ADD_THRESHOLD);
+    const uint8_t *blocks[] = {site.records};
+    const mospt_records records = {
+        .blocks = blocks, .stride = site.stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
+    void *work = malloc(prep_solve_work_size(count)), *other = malloc(prep_solve_work_size(count));
+    prep_subtree alone = {0}, shared = {0};
+    mospt_err err = {0};
+    assert_true(work != NULL && other != NULL);
+    CORE_NEED(prep_solve(&shape, site.grid.root, 0, &records, count, work, &alone, &err));
+    for (uint32_t threads = 1; threads <= 5; threads += 2) {
+        prep_workers *workers = NULL;
+        CORE_NEED(prep_workers_create(threads, &workers, &err));
+        CORE_NEED(prep_solve_shared(&shape, workers, site.grid.root, 0, &records, count, other,
+                                    &shared, &err));
+        assert_same_division(&alone, &shared);
+        prep_subtree_fini(&shared);
+        prep_workers_destroy(workers);
+    }
+    prep_subtree_fini(&alone);
+    free(work), free(other);
+    core_site_fini(&site);
+}
+
+static void all_threads_together_solve_like_one(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < CORE_KINDS; kind++)
+        assert_shared_like_alone((core_kind)kind, 26, 700000, 6);
+    assert_shared_like_alone(CORE_CLUSTERED, 12, 1000, 7); /* too few to divide */
+    assert_shared_like_alone(CORE_CLUSTERED, 18, 600000, 1);
+    assert_shared_like_alone(CORE_CLUSTERED, 5, 600000, 9); /* ends in piles */
+}
+
 static void one_node_is_made_of_all_the_points_given(void **state)
 {
     (void)state;
@@ -156,6 +210,7 @@ int main(void)
         cmocka_unit_test(deep_trees_need_more_levels_than_one_code_holds),
         cmocka_unit_test(piles_are_cut_into_nodes_of_at_most_pile_max),
         cmocka_unit_test(many_copies_of_few_points_are_solved),
+        cmocka_unit_test(all_threads_together_solve_like_one),
         cmocka_unit_test(one_node_is_made_of_all_the_points_given),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
