@@ -10,6 +10,9 @@
 #pragma STDC FP_CONTRACT OFF /* X * scale + offset must round twice, as everyone else's does */
 #endif
 
+/* Formats below 6 have these first: intensity, and those of add_standard_old(). */
+enum { HEAD_AT = 12, OLD_HEAD_FIELDS = 8 };
+
 enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 
 /* Records that are decoded field by field while they are in the first cache. */
@@ -150,6 +153,7 @@ void prep_las_layout_make(prep_scan *scan, const prep_las_header *header, prep_l
     layout.rgb_is_16 = sample->rgb_max > 255;
 
     add_copy(scan, &layout, "intensity", MOSPT_U16, 1, 12);
+    layout.has_old_head = format < 6;
     if (format < 6) add_standard_old(scan, &layout);
     else add_standard_new(scan, &layout);
     if (part[format].gps != 0) add_copy(scan, &layout, "gps_time", MOSPT_F64, 1, part[format].gps);
@@ -201,13 +205,17 @@ static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t 
 static void show_rgb(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
                      size_t out_stride)
 {
-    size_t stride = l->record_length;
-    p += l->rgb_at;
+    prep_tone tone = l->tone;
+    size_t stride = l->record_length, at = l->rgb_at;
+    bool is_16 = l->rgb_is_16, has_intensity = l->has_intensity;
     for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
+        uint8_t rgbi[4];
         for (int c = 0; c < 3; c++) {
-            uint16_t v = prep_le16(p + 2 * c);
-            out[c] = l->rgb_is_16 ? prep_tone_from_16(v) : v < 255 ? (uint8_t)v : 255;
+            uint16_t v = prep_le16(p + at + 2 * c);
+            rgbi[c] = is_16 ? prep_tone_from_16(v) : v < 255 ? (uint8_t)v : 255;
         }
+        rgbi[3] = has_intensity ? prep_tone_apply(&tone, prep_le16(p + 12)) : 255;
+        memcpy(out, rgbi, sizeof rgbi);
     }
 }
 
@@ -305,6 +313,31 @@ static void unpack_field(const prep_las_field *f, run r)
     }
 }
 
+/* True if the first fields follow each other where they are written. */
+static bool is_row(const prep_las_layout *l, const prep_places *to, uint32_t fields)
+{
+    bool is = to->plane[0] != NULL && !prep_host_is_big_endian();
+    for (uint32_t k = 1; is && k < fields; k++)
+        is = to->plane[k] == to->plane[k - 1] + l->field[k - 1].size &&
+             to->plane_stride[k] == to->plane_stride[0];
+    return is;
+}
+
+/* The fields that add_standard_old() and the intensity before them make, all at once: 8 bytes of a
+ * record become 10. */
+static void unpack_old_head(run r)
+{
+    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
+        uint64_t head = prep_le64(r.from), returns = head >> 16 & 0xff, class = head >> 24 & 0xff;
+        uint64_t flags = class >> 5 | (returns >> 6 & 1) << 4 | returns >> 7 << 5;
+        uint64_t row = (head & 0xffff) | (returns & 7) << 16 | (returns >> 3 & 7) << 24 |
+                       (class & 31) << 32 | flags << 40 | (head >> 32 & 0xffff) << 48;
+        uint16_t source = (uint16_t)(head >> 48);
+        memcpy(r.to, &row, sizeof row);
+        memcpy(r.to + sizeof row, &source, sizeof source);
+    }
+}
+
 /* Of points [begin, begin + count) of all. */
 static void unpack_block(const prep_las_layout *l, const uint8_t *records, uint32_t begin,
                          uint32_t count, const prep_places *to)
@@ -312,9 +345,18 @@ static void unpack_block(const prep_las_layout *l, const uint8_t *records, uint3
     uint8_t *rgbi = to->rgbi + begin * to->rgbi_stride;
     records += begin * (size_t)l->record_length;
     if (to->xyz != NULL) decode_xyz(l, records, count, to->xyz + 3 * (size_t)begin);
-    show_intensity(l, records, count, rgbi, to->rgbi_stride);
     if (l->has_rgb) show_rgb(l, records, count, rgbi, to->rgbi_stride);
-    for (uint32_t k = 0; k < l->field_count; k++) {
+    else show_intensity(l, records, count, rgbi, to->rgbi_stride);
+    uint32_t k = 0;
+    if (l->has_old_head && is_row(l, to, OLD_HEAD_FIELDS)) {
+        unpack_old_head((run){.from = records + HEAD_AT,
+                              .from_stride = l->record_length,
+                              .to = to->plane[0] + begin * to->plane_stride[0],
+                              .to_stride = to->plane_stride[0],
+                              .count = count});
+        k = OLD_HEAD_FIELDS;
+    }
+    for (; k < l->field_count; k++) {
         if (to->plane[k] == NULL) continue;
         unpack_field(&l->field[k], (run){.from = records + l->field[k].at,
                                          .from_stride = l->record_length,

@@ -76,29 +76,35 @@ static bool is_same_lattice(const prep_packed *packed, const mospt_grid *grid)
     return same;
 }
 
+/* Moves coordinates along one axis from the lattice of a file to the grid. Returns false if one of
+ * them is outside the root cube. */
+static bool pack_axis(const mospt_grid *grid, int a, const uint8_t *from, size_t from_stride,
+                      uint32_t count, uint8_t *to, size_t stride, prep_pack_sums *sums)
+{
+    uint64_t width = UINT64_C(1) << grid->bits, first = grid->root[a];
+    int64_t base = grid->base[a];
+    uint32_t low = sums->low[a], high = sums->high[a];
+    bool outside = false;
+    for (uint32_t i = 0; i < count; i++, from += from_stride, to += stride) {
+        int64_t cell = (int32_t)prep_le32(from) - base;
+        uint32_t g = (uint32_t)cell;
+        outside |= (uint64_t)cell - first >= width;
+        low = g < low ? g : low;
+        high = g > high ? g : high;
+        memcpy(to, &g, sizeof g);
+    }
+    sums->low[a] = low;
+    sums->high[a] = high;
+    return !outside;
+}
+
 /* As pack_positions() for records of the same lattice. */
 static void pack_lattice(const mospt_grid *grid, const prep_packed *packed, const uint8_t *from,
                          uint32_t count, uint8_t *records, size_t stride, prep_pack_sums *sums)
 {
-    uint64_t width = UINT64_C(1) << grid->bits;
-    uint32_t low[3], high[3];
-    bool inside = true;
-    memcpy(low, sums->low, sizeof low);
-    memcpy(high, sums->high, sizeof high);
-    for (uint32_t i = 0; i < count; i++, from += packed->stride, records += stride) {
-        uint32_t g[3];
-        for (int a = 0; a < 3; a++) {
-            int64_t cell = (int32_t)prep_le32(from + 4 * a) - grid->base[a];
-            inside = inside && (uint64_t)cell - grid->root[a] < width;
-            g[a] = (uint32_t)cell;
-            low[a] = g[a] < low[a] ? g[a] : low[a];
-            high[a] = g[a] > high[a] ? g[a] : high[a];
-        }
-        memcpy(records, g, sizeof g);
-    }
-    sums->outside = sums->outside || !inside;
-    memcpy(sums->low, low, sizeof low);
-    memcpy(sums->high, high, sizeof high);
+    for (int a = 0; a < 3; a++)
+        if (!pack_axis(grid, a, from + 4 * a, packed->stride, count, records + 4 * a, stride, sums))
+            sums->outside = true;
 }
 
 /* The same value in every row. */
