@@ -77,8 +77,8 @@ static bool sort_and_keep(dedupe *d, prep_spool *spool, uint32_t level, mospt_er
         prep_sorter sorter = {.grid = d->env->shape->grid, .records = &records};
         ok = prep_spool_view(d->env->store, spool, memory + sort_size(count), blocks, err);
         if (ok) {
-            prep_sort_begin(&sorter, keys, count);
-            prep_sort_below(&sorter, level, keys, keys + count, count);
+            prep_sort_begin(&sorter, count);
+            prep_sort_all(&sorter, level, keys, keys + count, count);
             ok = keep_first(d, &sorter, level, keys, keys + count, count, err);
         }
     }

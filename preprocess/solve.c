@@ -56,7 +56,7 @@ static void solver_init(solver *s, const prep_shape *shape, const mospt_records 
 {
     *s = (solver){.shape = shape, .keys = {work, (uint64_t *)work + count}};
     s->sorter = (prep_sorter){.grid = shape->grid, .records = records};
-    prep_sort_begin(&s->sorter, s->keys[0], count);
+    prep_sort_begin(&s->sorter, count);
 }
 
 static uint64_t *keys_of(const solver *s, const part *p)
@@ -298,7 +298,7 @@ bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t leve
     prep_subtree made = {0};
     solver_init(&s, shape, records, count, work);
     made.index_bits = s.sorter.index_bits;
-    prep_sort_below(&s.sorter, level, s.keys[0], s.keys[1], count);
+    prep_sort_all(&s.sorter, level, s.keys[0], s.keys[1], count);
     bool ok = solve_part(&s, whole(corner, level, count), &made, err);
     if (ok) *out = made;
     else prep_subtree_fini(&made);
@@ -406,8 +406,8 @@ bool prep_solve_shared(const prep_shape *shape, prep_workers *workers, const uin
     solver_init(&sh.s, shape, records, count, work);
     sh.made.index_bits = sh.s.sorter.index_bits;
     part p = whole(corner, level, count);
-    bool ok = prep_sort_below_shared(&sh.s.sorter, workers, level, sh.s.keys[0], sh.s.keys[1],
-                                     count, err) &&
+    bool ok = prep_sort_all_shared(&sh.s.sorter, workers, level, sh.s.keys[0], sh.s.keys[1], count,
+                                   err) &&
               append(&sh, &p, err);
     while (ok && sh.large_count > 0)
         ok = divide_large(&sh, err);
@@ -432,7 +432,7 @@ bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t
     prep_subtree made = {0};
     solver_init(&s, shape, records, count, work);
     made.index_bits = s.sorter.index_bits;
-    prep_sort_below(&s.sorter, level, s.keys[0], s.keys[1], count);
+    prep_sort_all(&s.sorter, level, s.keys[0], s.keys[1], count);
     part p = whole(corner, level, count);
     uint32_t cell_shift = made.index_bits + 3 * (s.sorter.code_levels - shape->inner_depth);
     if (!keep(&s, &p, child_mask, cell_shift, s.keys[0], count, &made, err)) return false;

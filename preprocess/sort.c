@@ -125,15 +125,20 @@ void prep_sort_keys(uint64_t *keys, uint64_t *spare, uint32_t count, uint32_t lo
     sort_part(keys, spare, count, low_bit, false);
 }
 
-void prep_sort_begin(prep_sorter *s, uint64_t *keys, uint32_t count)
+void prep_sort_begin(prep_sorter *s, uint32_t count)
 {
     s->index_bits = 0;
     while (count > 0 && (count - 1) >> s->index_bits > 0)
         s->index_bits++;
     s->code_levels = (64 - s->index_bits) / 3;
     if (s->code_levels > MOSPT_CODE_LEVELS) s->code_levels = MOSPT_CODE_LEVELS;
+}
+
+/* The keys of `count` records from the one with index `first`, without their cells. */
+static void find_indices(uint64_t *keys, uint32_t first, uint32_t count)
+{
     for (uint32_t i = 0; i < count; i++)
-        keys[i] = i;
+        keys[i] = first + i;
 }
 
 /* Gives keys the cells of the levels below `level`. */
@@ -155,6 +160,13 @@ void prep_sort_below(const prep_sorter *s, uint32_t level, uint64_t *keys, uint6
 {
     find_cells(s, level, keys, count);
     sort_part(keys, spare, count, s->index_bits, false);
+}
+
+void prep_sort_all(const prep_sorter *s, uint32_t level, uint64_t *keys, uint64_t *spare,
+                   uint32_t count)
+{
+    find_indices(keys, 0, count);
+    prep_sort_below(s, level, keys, spare, count);
 }
 
 /* The first split, done by all workers. */
@@ -186,6 +198,7 @@ static void find_slice(void *context, uint32_t slice)
     split *s = context;
     uint32_t count;
     uint64_t *keys = slice_keys(s, slice, &count), any = 0, all = UINT64_MAX;
+    find_indices(keys, slice * SLICE, count);
     find_cells(s->sorter, s->level, keys, count);
     for (uint32_t i = 0; i < count; i++)
         any |= keys[i], all &= keys[i];
@@ -231,8 +244,8 @@ static void place_slices(split *s)
         }
 }
 
-bool prep_sort_below_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
-                            uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err)
+bool prep_sort_all_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
+                          uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err)
 {
     split s = {.sorter = sorter, .level = level, .count = count, .keys = keys, .spare = spare};
     uint32_t slices = slice_count(&s);

@@ -14,21 +14,27 @@ typedef struct {
     uint32_t code_levels;         /* of a key, above the index */
 } prep_sorter;
 
-/* Chooses index_bits and code_levels for so many records, and sets keys to their indices.
- * keys     out, [count] */
-void prep_sort_begin(prep_sorter *sorter, uint64_t *keys, uint32_t count);
+/* Chooses index_bits and code_levels for so many records. */
+void prep_sort_begin(prep_sorter *sorter, uint32_t count);
+
+/* Makes the keys of all records, for the cells of the levels below the node at `level`, in which
+ * their points lie, in rising order; points of one cell in that of the records.
+ * keys     out, [count]
+ * spare    [count], holds nothing before and after */
+void prep_sort_all(const prep_sorter *sorter, uint32_t level, uint64_t *keys, uint64_t *spare,
+                   uint32_t count);
+
+/* The same by all workers.
+ * errors   MOSPT_ENOMEM
+ * threads  that of the workers */
+bool prep_sort_all_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
+                          uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err);
 
 /* Gives keys the cells of the levels below the node at `level`, in which their points lie, and puts
  * them in rising order; points of one cell keep theirs.
  * spare    [count], holds nothing before and after */
 void prep_sort_below(const prep_sorter *sorter, uint32_t level, uint64_t *keys, uint64_t *spare,
                      uint32_t count);
-
-/* The same by all workers.
- * errors   MOSPT_ENOMEM
- * threads  that of the workers */
-bool prep_sort_below_shared(const prep_sorter *sorter, prep_workers *workers, uint32_t level,
-                            uint64_t *keys, uint64_t *spare, uint32_t count, mospt_err *err);
 
 /* Sorts keys by their bits from `low_bit` up; keys alike in these keep their order.
  * spare    [count], holds nothing before and after */
