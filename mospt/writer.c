@@ -3,6 +3,7 @@
 #include "mospt/file.h"
 #include "mospt/hash.h"
 #include "mospt/point.h"
+#include "mospt/sink.h"
 
 #include <assert.h>
 #include <dirent.h>
@@ -16,7 +17,7 @@
 #include <unistd.h>
 
 /* Levels from here on share the last file: only piles of identical positions get so deep. */
-enum { FILES_MAX = 64, PIECE_SIZE = 1 << 18 };
+enum { FILES_MAX = MOSPT_SINK_FILES_MAX, PIECE_SIZE = 1 << 18 };
 #define PAYLOAD_NAME "points-%02u.bin"
 #define UNFINISHED_NAME "unfinished-%06" PRIu64 ".bin"
 
@@ -33,6 +34,8 @@ struct mospt_writer {
     bool found; /* an unfinished dataset was in the folder, and has not been touched yet */
     bool keeps; /* and is to be gone on from */
     bool finished;
+    mospt_sink *sink;              /* owned; NULL: payloads are written through the page cache */
+    uint64_t kept_size[FILES_MAX]; /* bytes of payloads that stay as they are */
     uint64_t commit, committed_points; /* of the last unfinished state; 0: none */
 
     pthread_mutex_t lock;
@@ -145,6 +148,14 @@ void mospt_writer_keep(mospt_writer *w, const mospt_metadata *kept)
     w->keeps = true;
     w->commit = kept->unfinished.commit;
     w->committed_points = kept->point_count;
+    for (uint32_t i = 0; i < kept->file_count && i < FILES_MAX; i++)
+        w->kept_size[i] = kept->files[i].size;
+}
+
+bool mospt_writer_bypass_cache(mospt_writer *w, size_t chunk_size, mospt_err *err)
+{
+    assert(w->count == 0 && w->sink == NULL);
+    return mospt_sink_create(chunk_size, &w->sink, err);
 }
 
 static bool add_file(mospt_writer *w, mospt_err *err)
@@ -154,10 +165,12 @@ static bool add_file(mospt_writer *w, mospt_err *err)
     char *path = mospt_file_join(w->path, name);
     if (path == NULL) return mospt_err_nomem(err, strlen(w->path));
     int fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd < 0) mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
-    else w->fd[w->file_count++] = fd;
+    bool ok = fd >= 0 || mospt_err_set(err, MOSPT_EIO, mospt_at_file(path), "cannot be created");
+    if (ok && w->sink != NULL)
+        ok = mospt_sink_add_file(w->sink, path, w->kept_size[w->file_count], err);
+    if (fd >= 0) w->fd[w->file_count++] = fd;
     free(path);
-    return fd >= 0;
+    return ok;
 }
 
 /* Before the first node has its place: what is not gone on from is removed, its root first. */
@@ -222,13 +235,17 @@ bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *
 {
     if (!mospt_writer_write_part(w, node, 0, payload, (size_t)node->payload_size, err))
         return false;
-    mospt_file_start_flush(w->fd[node->payload_file], node->payload_offset, node->payload_size);
+    if (w->sink == NULL)
+        mospt_file_start_flush(w->fd[node->payload_file], node->payload_offset, node->payload_size);
     return true;
 }
 
 bool mospt_writer_write_part(mospt_writer *w, const mospt_node *node, uint64_t skip,
                              const uint8_t *bytes, size_t size, mospt_err *err)
 {
+    if (w->sink != NULL)
+        return mospt_sink_write(w->sink, node->payload_file, node->payload_offset + skip, bytes,
+                                size, err);
     return mospt_file_write_at(w->fd[node->payload_file], w->path, node->payload_offset + skip,
                                bytes, size, err);
 }
@@ -239,6 +256,7 @@ static bool hash_range(const mospt_writer *w, const mospt_node *node, uint64_t s
     mospt_hasher *hasher = mospt_hasher_create();
     uint8_t *bytes = malloc(PIECE_SIZE);
     bool ok = (hasher != NULL && bytes != NULL) || mospt_err_nomem(err, PIECE_SIZE);
+    ok = ok && (w->sink == NULL || mospt_sink_flush(w->sink, err));
     for (uint64_t done = 0; ok && done < size; done += PIECE_SIZE) {
         size_t piece = size - done < PIECE_SIZE ? (size_t)(size - done) : PIECE_SIZE;
         ok = mospt_file_read_at(w->fd[node->payload_file], w->path,
@@ -320,6 +338,7 @@ static bool list_files(const state *s, mospt_metadata *m, mospt_err *err)
 
 static bool flush_files(const mospt_writer *w, const state *s, mospt_err *err)
 {
+    if (w->sink != NULL && !mospt_sink_flush(w->sink, err)) return false;
     for (uint32_t i = 0; i < s->file_count; i++)
         if (fsync(w->fd[i]) != 0)
             return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
@@ -386,9 +405,10 @@ bool mospt_writer_commit_part(mospt_writer *w, const mospt_metadata *metadata, u
     return ok;
 }
 
-/* An unfinished build may have left more than the dataset has. */
+/* An unfinished build may have left more than the dataset has, and so may the sink. */
 static bool cut_files(const mospt_writer *w, const state *s, mospt_err *err)
 {
+    if (w->sink != NULL && !mospt_sink_flush(w->sink, err)) return false;
     for (uint32_t i = 0; i < s->file_count; i++)
         if (ftruncate(w->fd[i], (off_t)s->size[i]) != 0)
             return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
@@ -414,6 +434,7 @@ void mospt_writer_destroy(mospt_writer *w)
     if (w == NULL) return;
     for (uint32_t i = 0; i < w->file_count; i++)
         close(w->fd[i]);
+    mospt_sink_destroy(w->sink);
     bool leaves = w->finished || w->found || w->commit > 0;
     if (!leaves && each_entry(w->path, remove_ours, NULL)) rmdir(w->path);
     pthread_mutex_destroy(&w->lock);

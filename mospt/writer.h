@@ -26,6 +26,10 @@ bool mospt_writer_create(const char *path, uint32_t inner_depth, mospt_writer **
  * kept     its metadata */
 void mospt_writer_keep(mospt_writer *writer, const mospt_metadata *kept);
 
+/* Has payloads written past the page cache, see mospt/sink.h. Before the first node has its place.
+ */
+bool mospt_writer_bypass_cache(mospt_writer *writer, size_t chunk_size, mospt_err *err);
+
 /* Gives a node its place, in the order in which nodes come: parents before their children, those of
  * a level in Morton order.
  * node     corner, level, child_mask, count and payload_size; out: place and index of its file

@@ -424,6 +424,10 @@ static bool run(build *b, mospt_err *err)
                         &b->plan, err))
         return false;
     if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
+    /* The page cache is left to others by what would be more than its share of it. */
+    if (b->points_total * mospt_record_size(&b->metadata->schema) > memory / 2 &&
+        !mospt_writer_bypass_cache(b->writer, b->plan.chunk_size, err))
+        return false;
 
     of_scan = malloc(source->scan_count * sizeof *of_scan);
     if (of_scan == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *of_scan);

@@ -1,5 +1,6 @@
 #include "preprocess/plan.h"
 
+#include "mospt/sink.h"
 #include "preprocess/finish.h"
 
 #include <unistd.h>
@@ -52,8 +53,13 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
     uint64_t slices = memory / 16 / slice_size(record_size);
     plan.batch_slices = (uint32_t)(slices < 1 ? 1 : slices > SLICES_MAX ? SLICES_MAX : slices);
 
-    uint64_t taken =
-        FIXED_SIZE + cells + spools * plan.block_size + plan.batch_slices * slice_size(record_size);
+    plan.chunk_size = MOSPT_SINK_CHUNK_MIN;
+    while (plan.chunk_size < MOSPT_SINK_CHUNK_MAX && plan.chunk_size < memory / 1024)
+        plan.chunk_size *= 2;
+
+    uint64_t taken = FIXED_SIZE + cells + spools * plan.block_size +
+                     plan.batch_slices * slice_size(record_size) +
+                     MOSPT_SINK_CHUNKS * plan.chunk_size;
     if (memory < (uint64_t)PREP_MEMORY_MIN_MIB << 20 || memory < taken + (taken >> 3))
         return mospt_err_set(
             err, MOSPT_EINVAL, mospt_nowhere(),
@@ -63,16 +69,18 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
             (unsigned long long)(((taken + (taken >> 3)) >> 20) + 1 > PREP_MEMORY_MIN_MIB
                                      ? ((taken + (taken >> 3)) >> 20) + 1
                                      : PREP_MEMORY_MIN_MIB));
-    plan.store_memory = (size_t)((memory - taken) / 8 * 3);
     /* When rejection files are finished, a pass has given back its cells and batches. While some of
      * their points are being solved, as many may be on their way to the disk. */
-    uint64_t finish =
-        (memory - taken) / 8 * 4 + cells + plan.batch_slices * slice_size(record_size);
+    uint64_t share = (memory - taken) / 8,
+             given_back = cells + plan.batch_slices * slice_size(record_size);
     size_t solve_size = prep_finish_size(record_size, 1),
            emit_size = prep_finish_emit_size(record_size, 1);
-    plan.solve_memory = (size_t)(finish / (solve_size + emit_size) * solve_size);
-    plan.solve_points = plan.solve_memory / solve_size;
+    plan.solve_points = (4 * share + given_back) / (solve_size + emit_size);
     if (plan.solve_points > SOLVE_POINTS_MAX) plan.solve_points = SOLVE_POINTS_MAX;
+    plan.solve_memory = (size_t)(plan.solve_points * solve_size);
+    /* The rest keeps points from going to the disk. */
+    uint64_t finish = plan.solve_points * (solve_size + emit_size);
+    plan.store_memory = (size_t)(7 * share - (finish > given_back ? finish - given_back : 0));
     *out = plan;
     return true;
 }

@@ -11,6 +11,7 @@ typedef struct {
     size_t store_memory;   /* bytes of full blocks that stay in memory */
     size_t solve_memory;   /* bytes for rejection files being finished */
     uint64_t solve_points; /* of a rejection file that is finished in one go, at most */
+    size_t chunk_size;     /* in which payloads are written past the page cache */
 } prep_plan;
 
 /* Memory of this machine, bytes. */
