@@ -15,15 +15,15 @@ enum { ALIGNMENT = 4096, WAITING_MAX = 4 };
 typedef struct chunk {
     struct chunk *next;
     uint32_t file;
-    uint64_t index; /* chunk_size times that is where it begins in the file */
-    size_t filled;  /* bytes that are there, which may have gaps between them */
-    size_t end;     /* of the last of them */
+    uint64_t index;  /* chunk_size times that is where it begins in the file */
+    size_t filled;   /* bytes that are there, which may have gaps between them */
+    size_t end;      /* of the last of them */
     uint32_t copies; /* threads that are filling it */
     bool is_dirty;   /* something is not yet in the file */
     bool is_full;    /* it only waits for being written */
     bool is_wanted;  /* by somebody who flushes */
     bool in_write;   /* a thread is writing it, and nobody fills it */
-    uint8_t *bytes; /* [chunk_size], owned */
+    uint8_t *bytes;  /* [chunk_size], owned */
 } chunk;
 
 typedef struct {
@@ -142,7 +142,8 @@ bool mospt_sink_create(size_t chunk_size, mospt_sink **out, mospt_err *err)
 
 bool mospt_sink_add_file(mospt_sink *s, const char *path, uint64_t size, mospt_err *err)
 {
-    file f = {.path = strdup(path), .plain = open(path, O_RDWR | O_CLOEXEC), .past = -1, .kept = size};
+    file f = {
+        .path = strdup(path), .plain = open(path, O_RDWR | O_CLOEXEC), .past = -1, .kept = size};
 #ifdef O_DIRECT
     f.past = open(path, O_WRONLY | O_DIRECT | O_CLOEXEC);
 #endif
@@ -197,8 +198,8 @@ static chunk *find_chunk(mospt_sink *s, uint32_t number, uint64_t index, mospt_e
     return *at = c;
 }
 
-/* Under the lock, without it while copying: as much as goes into one chunk. Returns how much; 0 after
- * a failure. */
+/* Under the lock, without it while copying: as much as goes into one chunk. Returns how much; 0
+ * after a failure. */
 static size_t write_some(mospt_sink *s, uint32_t number, uint64_t offset, const void *bytes,
                          size_t size, mospt_err *err)
 {
@@ -231,6 +232,9 @@ bool mospt_sink_write(mospt_sink *s, uint32_t number, uint64_t offset, const voi
     const uint8_t *from = bytes;
     size_t n = 1;
     pthread_mutex_lock(&s->lock);
+    uint64_t kept = s->files[number].kept, skip = kept > offset ? kept - offset : 0;
+    if (skip > size) skip = size;
+    from += skip, offset += skip, size -= (size_t)skip;
     for (; size > 0 && n > 0; from += n, offset += n, size -= n)
         n = write_some(s, number, offset, from, size, err);
     pthread_mutex_unlock(&s->lock);

@@ -11,7 +11,8 @@ enum {
     MOSPT_SINK_CHUNK_MIN = 64 << 10, /* bytes; a chunk is a power of two */
     MOSPT_SINK_CHUNK_MAX = 2 << 20,
     MOSPT_SINK_FILES_MAX = 64,
-    MOSPT_SINK_CHUNKS = 24, /* that are usually in memory: one or two a file, and those on their way */
+    MOSPT_SINK_CHUNKS =
+        24, /* that are usually in memory: one or two a file, and those on their way */
 };
 
 typedef struct mospt_sink mospt_sink;
@@ -21,7 +22,8 @@ bool mospt_sink_create(size_t chunk_size, mospt_sink **out, mospt_err *err);
 
 /* Files are numbered from 0 in the order in which they are added.
  * path     of a file that is there
- * size     bytes of it that stay as they are: everything from there on will be written */
+ * size     bytes of it that stay as they are, and are passed over in writing: everything from there
+ *          on will be written */
 bool mospt_sink_add_file(mospt_sink *sink, const char *path, uint64_t size, mospt_err *err);
 
 /* Each byte is written once, in any order.

@@ -151,6 +151,29 @@ static void a_flush_brings_what_was_written_before_it(void **state)
     mospt_sink_destroy(sink);
 }
 
+static void what_is_kept_stays(void **state)
+{
+    mospt_sink *sink = NULL;
+    mospt_err err = {0};
+    const uint64_t kept = 2 * CHUNK + 100, size = 5 * CHUNK + 3;
+    uint8_t *bytes = malloc(size);
+    (void)state;
+    assert_non_null(bytes);
+    make_file(0, kept);
+    CORE_NEED(mospt_sink_create(CHUNK, &sink, &err));
+    CORE_NEED(mospt_sink_add_file(sink, paths[0], kept, &err));
+    fill(bytes, 0, 0, size);
+    memset(bytes, 0, kept);
+    for (uint64_t at = 0, n; at < size; at += n) {
+        n = size - at < 30000 ? size - at : 30000;
+        CORE_NEED(mospt_sink_write(sink, 0, at, bytes + at, n, &err));
+    }
+    CORE_NEED(mospt_sink_flush(sink, &err));
+    assert_file(0, size);
+    mospt_sink_destroy(sink);
+    free(bytes);
+}
+
 static void a_full_disk_is_told_to_whoever_writes_or_flushes(void **state)
 {
     mospt_sink *sink = NULL;
@@ -174,6 +197,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(files_hold_what_several_threads_write_in_any_order),
         cmocka_unit_test(a_flush_brings_what_was_written_before_it),
+        cmocka_unit_test(what_is_kept_stays),
         cmocka_unit_test(a_full_disk_is_told_to_whoever_writes_or_flushes),
     };
     if (mkdtemp(folder) == NULL) return 1;
