@@ -2,6 +2,7 @@
  * batches and threads. */
 #include "tests/core_tools.h"
 
+#include "mospt/sink.h"
 #include "mospt/writer.h"
 #include "preprocess/finish.h"
 
@@ -14,6 +15,7 @@
 typedef struct {
     uint32_t levels, threads, batch;
     size_t block_size, store_memory, solve_memory;
+    bool bypasses_cache;
 } way;
 
 /* Who stops a build, after so many reports. */
@@ -68,6 +70,8 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     assert_true(mospt_writer_create(path, shape->inner_depth, &writer, err));
     assert_true(prep_resume_open(path, BUILD, workers, &resume, err));
     if (resume != NULL) mospt_writer_keep(writer, prep_resume_metadata(resume));
+    if (w->bypasses_cache)
+        assert_true(mospt_writer_bypass_cache(writer, MOSPT_SINK_CHUNK_MIN, err));
     if (stop != NULL) stop->writer = writer, stop->metadata = &metadata;
     prep_arena *arena = NULL;
     assert_true(prep_arena_create(w->solve_memory, &arena, err));
@@ -266,15 +270,26 @@ static uint32_t interrupt(const core_site *site, const prep_shape *shape, uint32
 {
     static const way ways[] = {
         {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000},
-        {.levels = 1, .threads = 1, .batch = 6000, .block_size = 900, .solve_memory = 1 << 30},
-        {.levels = 3, .threads = 7, .batch = 777, .block_size = 64, .store_memory = 1 << 30},
+        {.levels = 1,
+         .threads = 1,
+         .batch = 6000,
+         .block_size = 900,
+         .solve_memory = 1 << 30,
+         .bypasses_cache = true},
+        {.levels = 3,
+         .threads = 7,
+         .batch = 777,
+         .block_size = 64,
+         .store_memory = 1 << 30,
+         .bypasses_cache = true},
+        {.levels = 2, .threads = 3, .batch = 500, .block_size = 700, .solve_memory = 60000},
     };
     uint32_t found = 0;
     uint64_t points = 0;
     for (uint32_t k = 0;; k++) {
         mospt_err err = {0};
         stopper stop = {.reports_left = k * more, .commits = true};
-        if (pass_build(site, shape, &ways[k % 3], path, folder, &stop, &err)) return found;
+        if (pass_build(site, shape, &ways[k % 4], path, folder, &stop, &err)) return found;
         assert_int_equal(err.code, MOSPT_ECANCELLED);
         if (!core_exists(path)) continue;
         mospt_metadata m;
