@@ -13,6 +13,7 @@ typedef struct {
     bool (*read_pixels)(rgl *gl, bool from_window, uint32_t width, uint32_t height, uint8_t *rgb,
                         mospt_err *err);
     bool (*read_depth)(rgl *gl, int x, int y, int radius, float *out, mospt_err *err);
+    bool (*read_depths)(rgl *gl, float *out, mospt_err *err);
 } rgl_driver;
 
 struct rgl {

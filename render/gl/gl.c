@@ -272,8 +272,9 @@ static bool gl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, u
 }
 
 /* GL's first row is the lowest. */
-static void flip_rows(uint8_t *bytes, size_t row_size, uint32_t rows)
+static void flip_rows(void *picture, size_t row_size, uint32_t rows)
 {
+    uint8_t *bytes = picture;
     for (uint32_t r = 0; r < rows / 2; r++) {
         uint8_t *a = bytes + r * row_size, *b = bytes + (rows - 1 - r) * row_size;
         for (size_t i = 0; i < row_size; i++) {
@@ -312,6 +313,17 @@ static bool gl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_e
     return is_healthy(g, "reading depths", err);
 }
 
+static bool gl_read_depths(rgl *gl, float *out, mospt_err *err)
+{
+    gl_rgl *g = (gl_rgl *)gl;
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->scene_fbo));
+    GL(glPixelStorei(GL_PACK_ALIGNMENT, 4));
+    GL(glReadPixels(0, 0, (GLsizei)g->width, (GLsizei)g->height, GL_DEPTH_COMPONENT, GL_FLOAT,
+                    out));
+    flip_rows(out, g->width * sizeof *out, g->height);
+    return is_healthy(g, "reading depths", err);
+}
+
 static const rgl_driver GL_DRIVER = {
     .destroy = gl_destroy,
     .renderer = gl_renderer,
@@ -320,6 +332,7 @@ static const rgl_driver GL_DRIVER = {
     .draw = gl_draw,
     .read_pixels = gl_read_pixels,
     .read_depth = gl_read_depth,
+    .read_depths = gl_read_depths,
 };
 
 static bool make_shade_program(gl_rgl *g, mospt_err *err)

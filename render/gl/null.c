@@ -10,6 +10,8 @@ typedef struct {
     rgl base;
     mospt_vertex *arena; /* [size], owned */
     uint64_t size;
+    float depth; /* of every pixel of a scene */
+    uint64_t pixels;
     rgl_record record;
 } null_rgl;
 
@@ -88,6 +90,7 @@ static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
         n->record.octants_hash = scene->octants != NULL ? mospt_hash(scene->octants, size) : 0;
         n->record.picture_hash = 0;
         n->record.begins++;
+        n->pixels = (uint64_t)scene->frame.width * scene->frame.height;
     }
     n->record.ends += (parts & RGL_END) != 0;
     for (uint32_t b = 0; b < batch_count; b++)
@@ -105,9 +108,18 @@ static bool null_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t
 
 static bool null_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err)
 {
-    (void)gl, (void)x, (void)y, (void)err;
+    (void)x, (void)y, (void)err;
     for (int i = 0; i < (2 * radius + 1) * (2 * radius + 1); i++)
-        out[i] = 1;
+        out[i] = ((null_rgl *)gl)->depth;
+    return true;
+}
+
+static bool null_read_depths(rgl *gl, float *out, mospt_err *err)
+{
+    (void)err;
+    null_rgl *n = (null_rgl *)gl;
+    for (uint64_t i = 0; i < n->pixels; i++)
+        out[i] = n->depth;
     return true;
 }
 
@@ -119,6 +131,7 @@ static const rgl_driver NULL_DRIVER = {
     .draw = null_draw,
     .read_pixels = null_read_pixels,
     .read_depth = null_read_depth,
+    .read_depths = null_read_depths,
 };
 
 bool rgl_null_create(rgl **out, mospt_err *err)
@@ -126,6 +139,7 @@ bool rgl_null_create(rgl **out, mospt_err *err)
     null_rgl *n = calloc(1, sizeof *n);
     if (n == NULL) return mospt_err_nomem(err, sizeof *n);
     n->base.driver = &NULL_DRIVER;
+    n->depth = 1;
     *out = &n->base;
     return true;
 }
@@ -133,4 +147,9 @@ bool rgl_null_create(rgl **out, mospt_err *err)
 rgl_record rgl_null_record(const rgl *gl)
 {
     return ((const null_rgl *)gl)->record;
+}
+
+void rgl_null_set_depth(rgl *gl, float depth)
+{
+    ((null_rgl *)gl)->depth = depth;
 }

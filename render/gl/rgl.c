@@ -37,3 +37,8 @@ bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *er
 {
     return gl->driver->read_depth(gl, x, y, radius, out, err);
 }
+
+bool rgl_read_depths(rgl *gl, float *out, mospt_err *err)
+{
+    return gl->driver->read_depths(gl, out, err);
+}

@@ -71,6 +71,10 @@ bool rgl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height,
  * out      [(2 radius + 1)^2], rows from the top */
 bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err);
 
+/* Depths of all pixels of the last scene, or of what has been drawn of it so far.
+ * out      [width * height] of that scene's frame, top row first */
+bool rgl_read_depths(rgl *gl, float *out, mospt_err *err);
+
 /* The null backend's record of everything since it was made. */
 typedef struct {
     uint64_t points_drawn, points_uploaded, ranges, batches, begins, ends;
@@ -80,3 +84,6 @@ typedef struct {
     uint64_t overruns;      /* uploads or ranges outside the arena */
 } rgl_record;
 rgl_record rgl_null_record(const rgl *gl);
+
+/* What the null backend says of every pixel's depth from now on; 1 at first: nothing there. */
+void rgl_null_set_depth(rgl *gl, float depth);
