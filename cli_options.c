@@ -204,14 +204,27 @@ static bool o_fov(cli_options *o, const char *v)
     return o->camera.has_fov = read_real(v, 1, 170, &o->camera.fov_deg);
 }
 
+/* Low x, y, z, high x, y, z; -inf and inf are numbers, too. */
+static bool read_box(const char *text, double c[6])
+{
+    int used = 0;
+    return sscanf(text, "%lf,%lf,%lf,%lf,%lf,%lf%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5],
+                  &used) == 6 &&
+           text[used] == '\0' && c[0] <= c[3] && c[1] <= c[4] && c[2] <= c[5];
+}
+
 static bool o_crop(cli_options *o, const char *v)
 {
-    double *c = o->crop;
-    int used = 0;
-    o->has_crop = sscanf(v, "%lf,%lf,%lf,%lf,%lf,%lf%n", &c[0], &c[1], &c[2], &c[3], &c[4], &c[5],
-                         &used) == 6 &&
-                  v[used] == '\0' && c[0] <= c[3] && c[1] <= c[4] && c[2] <= c[5];
-    return o->has_crop;
+    return o->has_crop = read_box(v, o->crop);
+}
+
+static bool o_clip(cli_options *o, const char *v)
+{
+    double box[6];
+    o->look.has_clip = read_box(v, box);
+    for (int a = 0; o->look.has_clip && a < 3; a++)
+        o->look.clip.low[a] = box[a], o->look.clip.high[a] = box[a + 3];
+    return o->look.has_clip;
 }
 
 static bool o_budget(cli_options *o, const char *v)
@@ -473,6 +486,8 @@ static const struct {
      "of RGB colours; above 1 lifts the dark ones (default: 1)"},
     {"legend", NULL, 0, S | R, o_legend, "what the colours mean, in the picture"},
     {"no-edl", NULL, 0, V | S | R, o_no_edl, "without eye-dome lighting"},
+    {"clip", "BOX", 0, V | S | R, o_clip,
+     "show only what is inside X0,Y0,Z0,X1,Y1,Z1; -inf or inf where a side is open"},
     {"size", "WxH", 0, V | S | R, o_size, "of the picture or window, pixels (default: 1280x720)"},
     {"eye", "X,Y,Z", 0, V | S, o_eye, "where the camera stands, in the coordinates of the scans"},
     {"target", "X,Y,Z", 0, V | S, o_target, "what it looks at"},

@@ -20,6 +20,11 @@ typedef struct {
     double fov_deg;           /* vertical, 1 to 170; 60 without it */
 } rend_camera_options;
 
+/* A box along the axes of the world. */
+typedef struct {
+    double low[3], high[3]; /* metres */
+} rend_box;
+
 /* What colours show. */
 typedef enum {
     REND_COLOUR_RGB,
@@ -71,6 +76,8 @@ typedef struct {
     bool has_background;
     float background_top[3], background_bottom[3]; /* 0 to 1; without it a grey that light and dark
                                                       points stand out from */
+    bool has_clip;
+    rend_box clip; /* points outside are not shown */
 } rend_look;
 
 #define REND_POINT_PX_MAX_DEFAULT 6.0f

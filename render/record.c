@@ -90,6 +90,12 @@ static void print_key(FILE *f, const rend_key *key)
     fprintf(f, "]");
 }
 
+static void print_clip(FILE *f, bool has_clip, const rend_box *clip)
+{
+    for (int a = 0; has_clip && a < 3; a++)
+        fprintf(f, ", \"%.17g to %.17g\"", clip->low[a], clip->high[a]);
+}
+
 static void print_look(FILE *f, const rend_look *look)
 {
     fprintf(f, "\"look\": [%d, %.9g, %.9g, %.9g, %d, %d, %.9g, %.9g, %d", (int)look->size_mode,
@@ -102,6 +108,7 @@ static void print_look(FILE *f, const rend_look *look)
     fprintf(f, ", %d, %.17g, %.17g, %d, %.17g, %.17g, ", (int)look->has_range, look->range[0],
             look->range[1], (int)look->map, look->brightness, look->gamma);
     print_text(f, look->attribute);
+    print_clip(f, look->has_clip, &look->clip);
     fprintf(f, "],\n");
 }
 

@@ -52,12 +52,15 @@ static bool look_at(rend_scout *s, const rend_view_of *view, uint64_t frame)
     rend_frame of_view;
     const rend_selection *selection;
     const mospt_grid *grid = &s->dataset->metadata.grid;
+    rend_clip clip;
+    if (view->look.has_clip) rend_clip_make(grid, &view->look.clip, &clip);
     rend_frame_make(&view->camera, grid, s->low, s->high, view->width, view->height, &of_view);
     const rend_select_input input = {.hierarchy = &s->dataset->hierarchy,
                                      .grid = grid,
                                      .frame = &of_view,
                                      .budget_points = view->budget_points,
-                                     .min_node_px = view->min_node_px};
+                                     .min_node_px = view->min_node_px,
+                                     .clip = view->look.has_clip ? &clip : NULL};
     if (!rend_select_run(s->selector, &input, &selection, NULL)) return false;
     for (uint32_t i = 0; i < selection->draw_count; i++)
         ask_for(s, selection->draws[i].node, frame);

@@ -241,10 +241,17 @@ static bool draw(walk *w, const queued *q, float nearest_px, uint32_t count, mos
 
 typedef enum { SEEN, CULLED, SMALL } sight;
 
+static bool is_clipped(const walk *w, uint32_t node)
+{
+    const mospt_node *n = &w->in->hierarchy->nodes[node];
+    return w->in->clip != NULL &&
+           rend_clip_misses(w->in->clip, n->corner, mospt_cell_width(w->in->grid, n->level));
+}
+
 /* Steps 2 and 3. */
 static sight look_at(const walk *w, uint32_t node, const placed *p, float nearest_px)
 {
-    if (is_outside(w->in->frame, p)) return CULLED;
+    if (is_outside(w->in->frame, p) || is_clipped(w, node)) return CULLED;
     return node != 0 && nearest_px < w->min_node_px ? SMALL : SEEN;
 }
 

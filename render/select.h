@@ -4,7 +4,7 @@
  * projected node first. For each node popped, in this order:
  *
  *   1. Would its points exceed the budget? Then the traversal stops.
- *   2. Is it outside the view frustum? Then it is skipped, with all below it.
+ *   2. Is it outside the view frustum, or of the clip box? Then it is skipped, with all below it.
  *   3. Is its lowest level too small? Then it is skipped, with all below it.
  *   4. Is it resident? Then it is put on the draw list and its children on the queue. Else it is
  *      requested and skipped.
@@ -33,6 +33,7 @@
 #pragma once
 #include "mospt/linear.h"
 #include "render/camera.h"
+#include "render/clip.h"
 
 typedef enum {
     REND_ABSENT = 0,
@@ -54,6 +55,8 @@ typedef struct {
      * does. */
     uint64_t page_limit; /* 0: no limit */
     uint32_t page_points;
+    const rend_clip *clip; /* nodes outside are skipped like those of step 2; NULL: none. Points
+                              outside in nodes that are not count as drawn. */
 } rend_select_input;
 
 typedef struct {

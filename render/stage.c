@@ -56,6 +56,7 @@ struct rend_stage {
     uint32_t batch_start[2], batch_count;
 
     rend_frame frame;
+    rend_clip clip; /* of the selection, if the view has one */
     rend_figures figures;
     bool has_expected; /* the selection is that of `expected`, with all nodes */
     rend_view_of expected;
@@ -423,6 +424,7 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
         .edl_strength = look->no_edl ? 0 : (look->edl_strength > 0 ? look->edl_strength : 1) * 24,
         .edl_radius_px =
             look->edl_radius_px > 0 ? look->edl_radius_px : fmaxf(1, (float)view->height / 720),
+        .clip = look->has_clip ? &s->clip : NULL,
     };
     for (int c = 0; c < 3; c++) {
         scene.background_top[c] = look->has_background ? look->background_top[c] : top[c];
@@ -436,6 +438,7 @@ static bool select_view(rend_stage *s, const rend_view_of *view, bool everything
     s->has_expected = false;
     rend_frame_make(&view->camera, &s->dataset->metadata.grid, s->bounds_low, s->bounds_high,
                     view->width, view->height, &s->frame);
+    if (view->look.has_clip) rend_clip_make(&s->dataset->metadata.grid, &view->look.clip, &s->clip);
     rend_select_input input = {
         .hierarchy = &s->dataset->hierarchy,
         .grid = &s->dataset->metadata.grid,
@@ -445,6 +448,7 @@ static bool select_view(rend_stage *s, const rend_view_of *view, bool everything
         .min_node_px = view->min_node_px,
         .page_limit = everything ? 0 : s->page_count,
         .page_points = PAGE_POINTS,
+        .clip = view->look.has_clip ? &s->clip : NULL,
     };
     if (!rend_select_run(s->selector, &input, &s->selection, err)) return false;
     s->figures.points_drawn = 0;

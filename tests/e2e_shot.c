@@ -3,6 +3,7 @@
 #include "tests/ref_picture.h"
 #include "tests/render_tools.h"
 
+#include <math.h>
 #include <png.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,7 +59,9 @@ static const rend_look MASK = {.size_mode = REND_SIZE_FIXED,
                                .no_edl = true,
                                .has_background = true};
 
-static void compare_with_raw(core_kind kind, const rend_camera_options *camera, double may_miss)
+/* clip     shares of the site's extent; NULL: none */
+static void compare_with_raw(core_kind kind, const rend_camera_options *camera,
+                             const rend_box *clip, double may_miss)
 {
     render_site site;
     rend_camera c;
@@ -66,11 +69,18 @@ static void compare_with_raw(core_kind kind, const rend_camera_options *camera, 
     rend_shot_result result;
     uint8_t *ours = malloc(PIXELS), *raw = malloc(PIXELS);
     uint32_t both = 0, only_ours = 0, only_raw = 0;
+    rend_look look = MASK;
     render_site_make(kind, 60000, NULL, &site);
-    take(&site, "mask.png", (rend_shot_options){.look = MASK, .camera = *camera}, &result);
+    const mospt_metadata *m = &site.dataset->metadata;
+    look.has_clip = clip != NULL;
+    for (int a = 0; clip != NULL && a < 3; a++) {
+        look.clip.low[a] = m->low[a] + clip->low[a] * (m->high[a] - m->low[a]);
+        look.clip.high[a] = m->low[a] + clip->high[a] * (m->high[a] - m->low[a]);
+    }
+    take(&site, "mask.png", (rend_shot_options){.look = look, .camera = *camera}, &result);
     covered_pixels(&site, "mask.png", ours);
     CORE_NEED(rend_camera_make(camera, site.dataset, WIDTH, HEIGHT, &c, &err));
-    ref_picture_cover(site.dataset, &c, WIDTH, HEIGHT, raw);
+    ref_picture_cover(site.dataset, &c, clip != NULL ? &look.clip : NULL, WIDTH, HEIGHT, raw);
     for (size_t i = 0; i < PIXELS; i++)
         both += ours[i] && raw[i], only_ours += ours[i] > raw[i], only_raw += raw[i] > ours[i];
     assert_true(both > 500);
@@ -86,8 +96,8 @@ static void all_points_cover_what_a_plain_draw_covers(void **unused)
 {
     (void)unused;
     const rend_camera_options overview = {0};
-    compare_with_raw(CORE_PLANE, &overview, 0.08);
-    compare_with_raw(CORE_CLUSTERED, &overview, 0.08);
+    compare_with_raw(CORE_PLANE, &overview, NULL, 0.08);
+    compare_with_raw(CORE_CLUSTERED, &overview, NULL, 0.08);
 }
 
 static void seen_from_inside_not_a_pixel_is_missing(void **unused)
@@ -100,7 +110,17 @@ static void seen_from_inside_not_a_pixel_is_missing(void **unused)
     for (int a = 0; a < 3; a++)
         inside.eye[a] = (m->low[a] + m->high[a]) / 2, inside.target[a] = m->high[a];
     render_site_fini(&site);
-    compare_with_raw(CORE_UNIFORM, &inside, 0.01);
+    compare_with_raw(CORE_UNIFORM, &inside, NULL, 0.01);
+}
+
+static void a_clip_box_cuts_exactly(void **unused)
+{
+    (void)unused;
+    const rend_camera_options overview = {0};
+    const rend_box middle = {{0.2, 0.35, 0}, {0.6, 0.8, 0.55}},
+                   half_open = {{-INFINITY, -INFINITY, 0.25}, {0.5, INFINITY, INFINITY}};
+    compare_with_raw(CORE_CLUSTERED, &overview, &middle, 0.08);
+    compare_with_raw(CORE_UNIFORM, &overview, &half_open, 0.08);
 }
 
 static void the_same_options_give_the_same_bytes(void **unused)
@@ -239,6 +259,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_points_cover_what_a_plain_draw_covers),
         cmocka_unit_test(seen_from_inside_not_a_pixel_is_missing),
+        cmocka_unit_test(a_clip_box_cuts_exactly),
         cmocka_unit_test(the_same_options_give_the_same_bytes),
         cmocka_unit_test(cache_sizes_do_not_show),
         cmocka_unit_test(a_site_does_not_shake_at_utm_coordinates),

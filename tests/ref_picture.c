@@ -25,8 +25,8 @@ static void cover(const pinhole *c, const double world[3], uint8_t *covered)
     covered[(size_t)row * c->width + (size_t)column] = 1;
 }
 
-void ref_picture_cover(const mospt_dataset *dataset, const rend_camera *camera, uint32_t width,
-                       uint32_t height, uint8_t *covered)
+void ref_picture_cover(const mospt_dataset *dataset, const rend_camera *camera,
+                       const rend_box *clip, uint32_t width, uint32_t height, uint8_t *covered)
 {
     const mospt_hierarchy *h = &dataset->hierarchy;
     mospt_err err = {0};
@@ -42,7 +42,10 @@ void ref_picture_cover(const mospt_dataset *dataset, const rend_camera *camera, 
             const uint32_t g[3] = {v[i].x, v[i].y, v[i].z};
             double world[3];
             mospt_grid_to_world(&dataset->metadata.grid, g, world);
-            cover(&c, world, covered);
+            bool inside = true;
+            for (int a = 0; clip != NULL && a < 3; a++)
+                inside = inside && world[a] >= clip->low[a] && world[a] <= clip->high[a];
+            if (inside) cover(&c, world, covered);
         }
         free(v);
     }

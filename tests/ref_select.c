@@ -34,6 +34,11 @@ static view_of_node look(const rend_select_input *in, uint32_t node, bool *close
         if (farthest < 0) v.outside = true;
         if (fabs(farthest) < 1e-4 * (half + sqrt(to_centre))) *close_call = true;
     }
+    uint64_t width = mospt_cell_width(in->grid, n->level);
+    for (int a = 0; in->clip != NULL && a < 3; a++)
+        if ((uint64_t)n->corner[a] + width - 1 < in->clip->low[a] ||
+            n->corner[a] > in->clip->high[a] || in->clip->low[a] > in->clip->high[a])
+            v.outside = true;
     double ahead = 0;
     for (int a = 0; a < 3; a++)
         ahead += f->plane[4][a] * (c[a] - (f->plane[4][a] > 0 ? half : -half));

@@ -115,6 +115,15 @@ static void the_twin_agrees(void **unused)
             if (core_below(&state, 4) == 0)
                 in.page_limit = 1 + core_below(&state, 200), in.page_points = 100;
             if (core_below(&state, 4) == 0) in.min_node_px = 0;
+            rend_clip clip;
+            if (core_below(&state, 3) == 0) {
+                for (int a = 0; a < 3; a++) {
+                    uint32_t width = (uint32_t)(mospt_cell_width(&f.grid, 0) - 1);
+                    clip.low[a] = f.grid.root[a] + core_below(&state, width);
+                    clip.high[a] = f.grid.root[a] + core_below(&state, width);
+                }
+                in.clip = &clip;
+            }
             ref_selection r;
             ref_select(&in, &r);
             if (!r.close_call) assert_twins(&in, run(&f, &in), &r, &state), compared++;

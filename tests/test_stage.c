@@ -1,6 +1,7 @@
 #include "render/stage.h"
 #include "tests/render_tools.h"
 
+#include <math.h>
 #include <sched.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,6 +42,40 @@ static rgl_record still(const render_site *site, uint64_t ram, uint64_t gpu, ren
     assert_int_equal(record.points_drawn, figures->points_drawn);
     stop(&s);
     return record;
+}
+
+static void boxes_side_by_side_show_each_point_once(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_figures figures;
+    uint64_t sum = 0;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    uint64_t whole = still(&site, 0, 0, &figures).points_drawn;
+    const mospt_grid *grid = &site.dataset->metadata.grid;
+    for (int box = 0; box < 8; box++) {
+        scene s;
+        mospt_err err = {0};
+        const rend_limits limits = {.gpu_cache_bytes = box % 2 ? 1 : 0};
+        start(&site, &limits, &s);
+        s.view.look.has_clip = true;
+        for (int a = 0; a < 3; a++) {
+            uint32_t cut = grid->root[a] + (uint32_t)(mospt_cell_width(grid, 0) / 5 * 2 + 3);
+            bool upper = box >> a & 1;
+            s.view.look.clip.low[a] =
+                upper ? mospt_grid_axis_to_world(grid, a, cut + 1) : -INFINITY;
+            s.view.look.clip.high[a] = upper ? INFINITY : mospt_grid_axis_to_world(grid, a, cut);
+        }
+        CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+        rend_stage_figures(s.stage, &figures);
+        rgl_record record = rgl_null_record(s.gl);
+        sum += record.points_drawn;
+        assert_true(record.points_drawn <= figures.points_drawn); /* nodes are not cut */
+        assert_true(record.points_drawn < whole);
+        stop(&s);
+    }
+    assert_int_equal(sum, whole);
+    render_site_fini(&site);
 }
 
 /* Frames until nothing more is to come; returns how many. */
@@ -332,6 +367,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_still_is_the_same_whatever_the_cache_sizes),
+        cmocka_unit_test(boxes_side_by_side_show_each_point_once),
         cmocka_unit_test(frames_converge_to_the_still),
         cmocka_unit_test(a_small_gpu_cache_does_not_thrash),
         cmocka_unit_test(the_budget_holds_in_frames_and_stills),

@@ -7,7 +7,7 @@
 
 typedef struct {
     GLuint name;
-    GLint anchor, offset, rotation, inverse_tan, range, splat, grid_bits;
+    GLint anchor, offset, rotation, inverse_tan, range, splat, grid_bits, clip_low, clip_high;
 } points_program;
 
 typedef struct {
@@ -15,8 +15,8 @@ typedef struct {
     GLint range, edl, top, bottom, height;
 } shade_program;
 
-enum { ROUND = 1, OCTANTS = 2, KIND_COUNT = 4 }; /* flags */
-enum { OCTANTS_WIDTH = 1024 };                   /* texels; the shader knows it too */
+enum { ROUND = 1, OCTANTS = 2, CLIP = 4, KIND_COUNT = 8 }; /* flags */
+enum { OCTANTS_WIDTH = 1024 };                             /* texels; the shader knows it too */
 
 typedef struct {
     rgl base;
@@ -168,6 +168,7 @@ static bool use_points_program(gl_rgl *g, int kind, const points_program **out, 
         char defines[64] = "";
         strcat(defines, kind & ROUND ? "#define ROUND\n" : "");
         strcat(defines, kind & OCTANTS ? "#define OCTANTS\n" : "");
+        strcat(defines, kind & CLIP ? "#define CLIP\n" : "");
         if (!rgl_program_create(defines, RGL_POINTS_VERTEX, RGL_POINTS_FRAGMENT, &p->name, err))
             return false;
         p->anchor = glGetUniformLocation(p->name, "anchor");
@@ -177,6 +178,8 @@ static bool use_points_program(gl_rgl *g, int kind, const points_program **out, 
         p->range = glGetUniformLocation(p->name, "range");
         p->splat = glGetUniformLocation(p->name, "splat");
         p->grid_bits = glGetUniformLocation(p->name, "grid_bits");
+        p->clip_low = glGetUniformLocation(p->name, "clip_low");
+        p->clip_high = glGetUniformLocation(p->name, "clip_high");
     }
     *out = p;
     return true;
@@ -192,6 +195,10 @@ static void set_scene(const points_program *p, const rgl_scene *scene)
     GL(glUniform2f(p->inverse_tan, 1 / f->tan_half[0], 1 / f->tan_half[1]));
     GL(glUniform2f(p->range, log2f(f->near_w), 1 / log2f(f->far_w / f->near_w)));
     GL(glUniform1i(p->grid_bits, (GLint)scene->grid_bits));
+    if (scene->clip != NULL) {
+        GL(glUniform3uiv(p->clip_low, 1, scene->clip->low));
+        GL(glUniform3uiv(p->clip_high, 1, scene->clip->high));
+    }
     float size = scene->octants != NULL ? scene->splat_scale : scene->splat_size;
     GL(glUniform3f(p->splat, size * f->focal_px, scene->px_min, scene->px_max));
 }
@@ -221,7 +228,8 @@ static bool draw_points(gl_rgl *g, const rgl_scene *scene, const rgl_batch *batc
     GL(glBindTexture(GL_TEXTURE_2D, g->octants));
     for (uint32_t b = 0; b < batch_count; b++) {
         const points_program *p = NULL;
-        int kind = (batches[b].round ? ROUND : 0) | (scene->octants != NULL ? OCTANTS : 0);
+        int kind = (batches[b].round ? ROUND : 0) | (scene->octants != NULL ? OCTANTS : 0) |
+                   (scene->clip != NULL ? CLIP : 0);
         if (batches[b].range_count == 0) continue;
         if (!use_points_program(g, kind, &p, err)) return false;
         set_scene(p, scene);

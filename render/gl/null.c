@@ -65,7 +65,16 @@ static void record_vertex(null_rgl *n, const rgl_batch *batch, const mospt_verte
     n->record.points_drawn++;
 }
 
-static void record_batch(null_rgl *n, const rgl_batch *batch)
+static bool is_inside(const rend_clip *clip, const mospt_vertex *v)
+{
+    const uint32_t at[3] = {v->x, v->y, v->z};
+    bool inside = true;
+    for (int a = 0; clip != NULL && a < 3; a++)
+        inside = inside && at[a] >= clip->low[a] && at[a] <= clip->high[a];
+    return inside;
+}
+
+static void record_batch(null_rgl *n, const rend_clip *clip, const rgl_batch *batch)
 {
     n->record.batches++;
     for (uint32_t r = 0; r < batch->range_count; r++) {
@@ -76,7 +85,8 @@ static void record_batch(null_rgl *n, const rgl_batch *batch)
             continue;
         }
         for (uint64_t v = 0; v < count; v++)
-            record_vertex(n, batch, &n->arena[first + v]);
+            if (is_inside(clip, &n->arena[first + v]))
+                record_vertex(n, batch, &n->arena[first + v]);
     }
 }
 
@@ -94,7 +104,7 @@ static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
     }
     n->record.ends += (parts & RGL_END) != 0;
     for (uint32_t b = 0; b < batch_count; b++)
-        record_batch(n, &batches[b]);
+        record_batch(n, scene->clip, &batches[b]);
     return true;
 }
 

@@ -9,6 +9,7 @@
 #pragma once
 #include "mospt/point.h"
 #include "render/camera.h"
+#include "render/clip.h"
 
 typedef struct rgl rgl;
 
@@ -26,6 +27,8 @@ typedef struct {
     float edl_strength;   /* 0: off */
     float edl_radius_px;
     float background_top[3], background_bottom[3];
+    const rend_clip *clip; /* a vertex v is drawn if clip->low[a] <= v[a] <= clip->high[a] on all
+                              three axes, compared as unsigned integers; NULL: all are */
 } rgl_scene;
 
 /* Ranges of points that are drawn alike. */

@@ -33,6 +33,9 @@ const char RGL_POINTS_VERTEX[] =
     "#else\n"
     "float cell_at(uvec3 place) { return 1.0; }\n"
     "#endif\n"
+    "#ifdef CLIP\n"
+    "uniform uvec3 clip_low, clip_high;\n"
+    "#endif\n"
     "void main()\n"
     "{\n"
     "    bvec3 ahead = greaterThanEqual(position, anchor);\n"
@@ -45,6 +48,10 @@ const char RGL_POINTS_VERTEX[] =
     "    gl_Position = vec4(eye.xy * inverse_tan, (2.0 * depth - 1.0) * w, w);\n"
     "    gl_PointSize = clamp(splat.x * cell_at(position) / max(w, 1e-30), splat.y, splat.z);\n"
     "    tint = colour.rgb;\n"
+    "#ifdef CLIP\n" /* beyond the far plane there is nothing */
+    "    if (any(lessThan(position, clip_low)) || any(greaterThan(position, clip_high)))\n"
+    "        gl_Position = vec4(0.0, 0.0, 2.0, 1.0);\n"
+    "#endif\n"
     "}\n";
 
 const char RGL_POINTS_FRAGMENT[] = "flat in vec3 tint;\n"
