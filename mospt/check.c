@@ -1,5 +1,6 @@
 #include "mospt/check.h"
 
+#include "mospt/deal.h"
 #include "mospt/file.h"
 #include "mospt/hash.h"
 #include "mospt/payload.h"
@@ -64,8 +65,19 @@ static bool bit_is_set(const uint8_t *cells, uint32_t cell)
     return cells[cell >> 3] >> (cell & 7) & 1;
 }
 
-/* The first level_end[i] points lie one in each occupied cell of depth i, in Morton order within
- * what the level adds. */
+/* What a level adds is in Morton order, dealt. `at` is the point that is not. */
+static bool is_in_order(const uint32_t *codes, uint32_t begin, uint32_t end, uint32_t *at)
+{
+    mospt_deal deal = mospt_deal_of(end - begin);
+    for (uint32_t k = 1; k < end - begin; k++) {
+        *at = begin + mospt_deal_place(&deal, k);
+        if (codes[*at] < codes[begin + mospt_deal_place(&deal, k - 1)]) return false;
+    }
+    return true;
+}
+
+/* The first level_end[i] points lie one in each occupied cell of depth i, in the order of its level
+ * within what that adds. */
 static void check_levels(checker *c, uint32_t node)
 {
     const mospt_node *n = &c->dataset->hierarchy.nodes[node];
@@ -86,12 +98,15 @@ static void check_levels(checker *c, uint32_t node)
         for (uint32_t i = 0; i < end; i++)
             c->cells[c->codes[i] >> shift >> 3] = 0;
     }
-    for (uint32_t level = 0, begin = 0; level <= depth + 1 && wrong == NULL;
-         begin = n->level_end[level++])
-        for (at = begin + 1; at < n->level_end[level] && wrong == NULL; at++)
-            if (c->codes[at] < c->codes[at - 1])
-                wrong = "points of a level are not in Morton order";
-    if (wrong != NULL) report_node(c, node, at > 0 ? at - 1 : 0, wrong);
+    if (wrong != NULL) {
+        report_node(c, node, at > 0 ? at - 1 : 0, wrong);
+        return;
+    }
+    for (uint32_t level = 0, begin = 0; level <= depth + 1; begin = n->level_end[level++])
+        if (!is_in_order(c->codes, begin, n->level_end[level], &at)) {
+            report_node(c, node, at, "points of a level are not in its order");
+            return;
+        }
 }
 
 /* Octants with a child reject: no two of their points share a finest cell. The others add, but no

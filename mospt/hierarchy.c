@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* Bytes of the file: docs/format.md. All numbers are little-endian. */
-enum { HEADER_SIZE = 64, RECORD_FIXED_SIZE = 64, VERSION = 1, NODES_MAX = 1 << 28 };
+enum { HEADER_SIZE = 64, RECORD_FIXED_SIZE = 64, VERSION = 2, NODES_MAX = 1 << 28 };
 static const char MAGIC[8] = "IPTSHIER";
 
 typedef struct {

@@ -1,5 +1,7 @@
 #include "mospt/linear.h"
 
+#include "mospt/deal.h"
+
 enum {
     FEW = 64,   /* points in one cell, for a plain sort */
     AHEAD = 64, /* keys by which the memory that they point to is asked for early */
@@ -237,12 +239,16 @@ void mospt_linear_build(const mospt_linear_input *in, uint64_t *keys, uint32_t c
                         uint32_t *order, uint32_t *level_end)
 {
     linear l = {.in = in, .level = work};
-    uint32_t next[MOSPT_LEVELS_MAX] = {0};
+    uint32_t next[MOSPT_LEVELS_MAX][MOSPT_HANDS], dealt[MOSPT_LEVELS_MAX] = {0};
     if (count > 0) assign_levels(&l, keys, count);
     for (uint32_t level = 0, end = 0; level < in->depth + 2; level++) {
-        next[level] = end;
+        mospt_deal deal = mospt_deal_of(l.at[level]);
+        for (uint32_t h = 0; h < MOSPT_HANDS; h++)
+            next[level][h] = end + deal.begin[h];
         level_end[level] = end += l.at[level];
     }
-    for (uint32_t i = 0; i < count; i++)
-        order[next[l.level[i]]++] = mospt_linear_index(keys[i], in->index_bits);
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t level = l.level[i], hand = dealt[level]++ % MOSPT_HANDS;
+        order[next[level][hand]++] = mospt_linear_index(keys[i], in->index_bits);
+    }
 }

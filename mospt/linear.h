@@ -4,7 +4,8 @@
  * original points below it, the one whose colour is nearest to the average of its children; a point
  * stands in the coarsest level that it represents. So the first level_end[i] points are level i:
  * exactly one point for each occupied cell of depth i. Points that share a finest cell with another
- * one (octants that add, section 4.6) follow in one more level, depth + 1. */
+ * one (octants that add, section 4.6) follow in one more level, depth + 1. What a level adds is dealt
+ * (mospt/deal.h), so that a prefix that ends inside of it is even, too. */
 #pragma once
 #include "mospt/hierarchy.h"
 #include "mospt/point.h"
@@ -31,7 +32,8 @@ size_t mospt_linear_work_size(uint32_t count);
  * keys       [count], by rising cell; those in one cell may come in any order, and are put into the
  *            one that their bytes give
  * work       mospt_linear_work_size(count) bytes, aligned for any type
- * order      out, [count] record indices, coarsest level first, Morton order within a level
+ * order      out, [count] record indices, coarsest level first; within a level the Morton
+ *            order, dealt (mospt/deal.h)
  * level_end  out, [depth + 2] */
 void mospt_linear_build(const mospt_linear_input *input, uint64_t *keys, uint32_t count, void *work,
                         uint32_t *order, uint32_t *level_end);

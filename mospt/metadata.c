@@ -10,7 +10,7 @@
 /* The text ends in a line with the checksum of all bytes before it, so that no byte of the file is
  * unchecked. */
 static const char TAIL_FORMAT[] = ",\n  \"checksum\": \"%016" PRIx64 "\"\n}\n";
-enum { TAIL_SIZE = 37, TEXT_SIZE_MAX = 1 << 30, VERSION = 1 };
+enum { TAIL_SIZE = 37, TEXT_SIZE_MAX = 1 << 30, VERSION = 2 };
 
 void mospt_metadata_fini(mospt_metadata *m)
 {

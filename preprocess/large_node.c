@@ -1,5 +1,7 @@
 #include "preprocess/large_node.h"
 
+#include "mospt/deal.h"
+
 #include <stdlib.h>
 
 enum {
@@ -26,6 +28,7 @@ typedef struct {
     uint32_t cell_count;
     cell *cells; /* [cell_count], owned, in Morton order */
     mospt_node node;
+    uint32_t dealt[MOSPT_LEVELS_MAX]; /* points of each level of the node that are written */
     uint64_t points_hash;
 } large;
 
@@ -195,31 +198,40 @@ static bool write_run(large *l, const cell *c, const uint8_t *payload, uint32_t 
     return true;
 }
 
+/* Place in the node of point k, in Morton order, of what a level adds. */
+static uint32_t place_in_level(const large *l, uint32_t level, uint32_t k)
+{
+    uint32_t begin = level > 0 ? l->node.level_end[level - 1] : 0;
+    mospt_deal deal = mospt_deal_of(l->node.level_end[level] - begin);
+    return begin + mospt_deal_place(&deal, k);
+}
+
+/* Writes what level i of a cell adds. The Morton order of the node's level is that of the cells, one
+ * after the other, so that a hand of the cell goes to one hand of the node, in one piece. */
+static bool write_level(large *l, const cell *c, const uint8_t *payload, uint32_t i, mospt_err *err)
+{
+    uint32_t begin = c->level_end[i - 1], count = c->level_end[i] - begin, level = l->cut + i;
+    mospt_deal deal = mospt_deal_of(count);
+    for (uint32_t h = 0; h < MOSPT_HANDS && h < count; h++) {
+        uint32_t from = begin + deal.begin[h], size = (count - h - 1) / MOSPT_HANDS + 1,
+                 to = place_in_level(l, level, l->dealt[level] + h);
+        if (!write_run(l, c, payload, from, from + size, to, err)) return false;
+    }
+    l->dealt[level] += count;
+    return true;
+}
+
 /* The point that stands for the cell goes to the level where it does; what the other levels of the
  * cell add, to those of the node. */
 static bool write_cell(large *l, cell *c, const uint8_t *payload, uint64_t points_hash,
                        mospt_err *err)
 {
-    uint32_t *next = l->node.level_end;
+    uint32_t to = place_in_level(l, c->depth, l->dealt[c->depth]++);
     (void)points_hash;
-    if (!write_run(l, c, payload, 0, 1, next[c->depth]++, err)) return false;
-    for (uint32_t i = 1; i < l->shape.inner_depth + 2; i++) {
-        uint32_t begin = c->level_end[i - 1], end = c->level_end[i];
-        if (begin < end && !write_run(l, c, payload, begin, end, next[l->cut + i], err))
-            return false;
-        next[l->cut + i] += end - begin;
-    }
+    if (!write_run(l, c, payload, 0, 1, to, err)) return false;
+    for (uint32_t i = 1; i < l->shape.inner_depth + 2; i++)
+        if (!write_level(l, c, payload, i, err)) return false;
     return true;
-}
-
-/* Writes all cells in their order. While that goes on, the level ends say how far each level has
- * got. */
-static bool write_all(large *l, mospt_err *err)
-{
-    uint32_t levels = l->env->shape->inner_depth + 2;
-    for (uint32_t i = levels; i-- > 0;)
-        l->node.level_end[i] = i > 0 ? l->node.level_end[i - 1] : 0;
-    return make_all(l, write_cell, err);
 }
 
 static bool make_node(large *l, mospt_err *err)
@@ -233,7 +245,7 @@ static bool make_node(large *l, mospt_err *err)
     };
     if (!divide(l, err) || !make_all(l, note_cell, err) || !sum_up(l, err)) return false;
     l->node.payload_size = l->node.count * stride;
-    if (!mospt_writer_place(l->env->writer, &l->node, &index, err) || !write_all(l, err) ||
+    if (!mospt_writer_place(l->env->writer, &l->node, &index, err) || !make_all(l, write_cell, err) ||
         !mospt_writer_hash(l->env->writer, &l->node, err))
         return false;
     mospt_writer_complete(l->env->writer, index, &l->node, l->points_hash);

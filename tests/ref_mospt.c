@@ -1,6 +1,7 @@
 #include "tests/ref_mospt.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
     const uint8_t *record;
@@ -154,12 +155,31 @@ static uint32_t collect(const cell *c, uint32_t level, const uint8_t **out)
     return n;
 }
 
+static uint32_t bits_reversed(uint32_t turn)
+{
+    return (turn & 1) << 3 | (turn & 2) << 1 | (turn & 4) >> 1 | (turn & 8) >> 3;
+}
+
+/* Takes every 16th, sixteen times. */
+static void deal(const uint8_t **order, uint32_t n)
+{
+    const uint8_t **morton = malloc((n + 1) * sizeof *morton);
+    uint32_t to = 0;
+    if (morton == NULL) abort();
+    memcpy(morton, order, n * sizeof *morton);
+    for (uint32_t turn = 0; turn < 16; turn++)
+        for (uint32_t k = bits_reversed(turn); k < n; k += 16)
+            order[to++] = morton[k];
+    free(morton);
+}
+
 void ref_mospt_finish(ref_mospt *m, const uint8_t **order, uint32_t *level_end)
 {
     uint32_t n = 0;
     if (m->count > 0) represent(m, &m->root, 0);
     for (uint32_t level = 0; level <= m->depth + 1; level++) {
-        n += collect(&m->root, level, order + n);
-        level_end[level] = n;
+        uint32_t added = collect(&m->root, level, order + n);
+        deal(order + n, added);
+        level_end[level] = n += added;
     }
 }

@@ -2,6 +2,8 @@
 #include "tests/core_tools.h"
 #include "tests/ref_mospt.h"
 
+#include "mospt/deal.h"
+
 #include "preprocess/sort.h"
 
 #include <stdio.h>
@@ -146,6 +148,30 @@ static void each_prefix_holds_one_point_of_each_occupied_cell(void **state)
     core_site_fini(&site);
 }
 
+/* Of a level's points in a row along its Morton order, any prefix of the level holds its share, but
+ * for one in each window of 16. */
+static void each_part_of_a_level_is_spread_over_all_of_it(void **state)
+{
+    enum { COUNT = 1003, WINDOW = 16 };
+    uint32_t place[COUNT];
+    bool taken[COUNT] = {false};
+    (void)state;
+    mospt_deal deal = mospt_deal_of(COUNT);
+    for (uint32_t k = 0; k < COUNT; k++) {
+        place[k] = mospt_deal_place(&deal, k);
+        assert_true(place[k] < COUNT && !taken[place[k]]);
+        taken[place[k]] = true;
+    }
+    for (uint32_t prefix = 0; prefix <= COUNT; prefix++)
+        for (uint32_t from = 0; from + WINDOW <= COUNT; from += WINDOW) {
+            uint32_t in_prefix = 0;
+            for (uint32_t k = from; k < from + WINDOW; k++)
+                in_prefix += place[k] < prefix;
+            assert_true(in_prefix * COUNT <= (prefix + COUNT / WINDOW + 1) * WINDOW);
+            assert_true((in_prefix + 1) * COUNT >= prefix * WINDOW);
+        }
+}
+
 static void representative_is_the_child_nearest_to_the_average_colour(void **state)
 {
     /* Eight points in the eight octants; averages by hand: red 0 10 ... 70, mean 35: 30 and 40 tie,
@@ -190,6 +216,7 @@ int main(void)
             grids_coarser_or_finer_than_the_cells_are_ordered_like_the_octree_of_pointers),
         cmocka_unit_test(order_of_arrival_does_not_show),
         cmocka_unit_test(each_prefix_holds_one_point_of_each_occupied_cell),
+        cmocka_unit_test(each_part_of_a_level_is_spread_over_all_of_it),
         cmocka_unit_test(representative_is_the_child_nearest_to_the_average_colour),
         cmocka_unit_test(prefix_is_the_first_level_fine_enough),
     };

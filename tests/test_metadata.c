@@ -243,8 +243,8 @@ static char *replaced(const char *text, size_t size, const char *what, const cha
 static void a_liar_with_the_right_checksum_is_refused(void **state)
 {
     static const char *const lies[][2] = {
-        {"\"version\": 1", "\"version\": 2"},
-        {"\"version\": 1", "\"version\": \"1\""},
+        {"\"version\": 2", "\"version\": 1"},
+        {"\"version\": 2", "\"version\": \"2\""},
         {"\"instantpoints dataset\"", "\"another dataset\""},
         {"\"additive\"", "\"replacing\""},
         {"\"additive\"", "7"},
