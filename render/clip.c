@@ -16,6 +16,26 @@ void rend_clip_make(const mospt_grid *grid, const rend_box *box, rend_clip *out)
     }
 }
 
+rend_box rend_clip_open(void)
+{
+    return (rend_box){{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+}
+
+void rend_clip_cut(const double back[3], const double place[3], rend_box *box)
+{
+    int a = 0;
+    for (int b = 1; b < 3; b++)
+        if (fabs(back[b]) > fabs(back[a])) a = b;
+    /* The other side may be in front of the place: then it opens. */
+    if (back[a] > 0) {
+        box->high[a] = place[a];
+        if (box->low[a] > place[a]) box->low[a] = -INFINITY;
+    } else {
+        box->low[a] = place[a];
+        if (box->high[a] < place[a]) box->high[a] = INFINITY;
+    }
+}
+
 bool rend_clip_misses(const rend_clip *clip, const uint32_t corner[3], uint64_t width)
 {
     for (int a = 0; a < 3; a++)

@@ -15,6 +15,13 @@ typedef struct {
  * passes through it, so that coordinates as a scan gives them are inside of their own box. */
 void rend_clip_make(const mospt_grid *grid, const rend_box *box, rend_clip *out);
 
+/* A box with all its sides open. */
+rend_box rend_clip_open(void);
+
+/* Moves the side of a box that faces the eye to a place: what stood in front of it is cut away.
+ * back     from the view towards the eye, any length */
+void rend_clip_cut(const double back[3], const double place[3], rend_box *box);
+
 /* True if no point of a cube can be inside.
  * width    in steps */
 bool rend_clip_misses(const rend_clip *clip, const uint32_t corner[3], uint64_t width);

@@ -235,35 +235,55 @@ static void set_speeds(rend_curve *c, bool abrupt)
     }
 }
 
-/* A monotone cubic of time through one value of each keyframe, flat at both ends. */
-static double value_at(const rend_curve *c, uint32_t i, double time_s,
-                       double of_key(const rend_key *))
+/* A monotone cubic of time through the values of four keyframes, from that before segment i on. */
+static double cubic_at(const rend_curve *c, uint32_t i, double time_s, const double v[4])
 {
-    double v[4], slope[2] = {0, 0};
-    for (uint32_t j = 0; j < 4; j++) {
-        uint32_t at = i + j >= 1 && i + j - 1 < c->count ? i + j - 1 : i;
-        v[j] = of_key(&c->knots[at].key);
-    }
-    double width = seconds(c, i);
+    double width = seconds(c, i), slope[2] = {0, 0};
     if (i > 0) slope[0] = monotone_slope(seconds(c, i - 1), v[1] - v[0], width, v[2] - v[1]);
     if (i + 2 < c->count)
         slope[1] = monotone_slope(width, v[2] - v[1], seconds(c, i + 1), v[3] - v[2]);
     return hermite(time_s - c->knots[i].key.time_s, width, v + 1, slope);
 }
 
-static double log_distance(const rend_key *key)
+/* Through one value of each keyframe, flat at both ends, and beside keyframes without one (NAN). */
+static double value_at(const rend_curve *c, uint32_t i, double time_s, int which,
+                       double of_key(const rend_key *, int which))
 {
+    double v[4];
+    for (uint32_t j = 0; j < 4; j++) {
+        uint32_t at = i + j >= 1 && i + j - 1 < c->count ? i + j - 1 : i;
+        v[j] = of_key(&c->knots[at].key, which);
+    }
+    if (isnan(v[1]) || isnan(v[2])) return v[1];
+    if (isnan(v[0])) v[0] = v[1];
+    if (isnan(v[3])) v[3] = v[2];
+    return cubic_at(c, i, time_s, v);
+}
+
+static double log_distance(const rend_key *key, int unused)
+{
+    (void)unused;
     return log(distance3(key->camera.eye, key->camera.target));
 }
 
-static double field_of_view(const rend_key *key)
+static double field_of_view(const rend_key *key, int unused)
 {
+    (void)unused;
     return key->camera.fov_rad;
 }
 
-static double log_budget(const rend_key *key)
+static double log_budget(const rend_key *key, int unused)
 {
-    return log((double)key->budget_points);
+    (void)unused;
+    bool is_number = key->budget_points > 0 && key->budget_points < REND_ALL;
+    return is_number ? log((double)key->budget_points) : NAN;
+}
+
+/* Sides 0 to 2 are the low ones. */
+static double clip_side(const rend_key *key, int side)
+{
+    double at = side < 3 ? key->clip.low[side] : key->clip.high[side - 3];
+    return key->has_clip && isfinite(at) ? at : NAN;
 }
 
 /* ---- making a curve ---- */
@@ -371,22 +391,29 @@ static void camera_at(const rend_curve *c, uint32_t i, double time_s, rend_camer
         segment_at(c, i, true, share, q);
         if (k->motion == MOVES) segment_at(c, i, false, parameter_at(k, share), out->eye);
     }
-    double distance = exp(value_at(c, i, time_s, log_distance));
+    double distance = exp(value_at(c, i, time_s, 0, log_distance));
     turn_axis(q, 2, back);
     for (int a = 0; a < 3; a++)
         out->target[a] = out->eye[a] - distance * back[a];
     if (!c->level) turn_axis(q, 1, out->up);
-    out->fov_rad = value_at(c, i, time_s, field_of_view);
+    out->fov_rad = value_at(c, i, time_s, 0, field_of_view);
 }
 
 static uint64_t budget_at(const rend_curve *c, uint32_t i, double time_s)
 {
     uint64_t from = c->knots[i].key.budget_points, to = c->knots[i + 1].key.budget_points;
-    if (from == to || from == 0 || to == 0 || from == REND_ALL || to == REND_ALL) return from;
-    /* Beyond its two ends a cubic may not look: a neighbour may have no number. */
-    double f = (time_s - c->knots[i].key.time_s) / seconds(c, i);
-    double low = log_budget(&c->knots[i].key), high = log_budget(&c->knots[i + 1].key);
-    return (uint64_t)exp(low + (high - low) * f * f * (3 - 2 * f));
+    double value = value_at(c, i, time_s, 0, log_budget);
+    return from == to || isnan(value) || to == 0 || to == REND_ALL ? from : (uint64_t)exp(value);
+}
+
+/* What a side has no value for stays as it was at the keyframe before. */
+static void clip_at(const rend_curve *c, uint32_t i, double time_s, rend_box *out)
+{
+    for (int side = 0; side < 6; side++) {
+        double value = value_at(c, i, time_s, side, clip_side);
+        double *to = side < 3 ? &out->low[side] : &out->high[side - 3];
+        if (!isnan(value)) *to = value;
+    }
 }
 
 void rend_curve_at(const rend_curve *curve, double time_s, rend_moment *out)
@@ -395,12 +422,16 @@ void rend_curve_at(const rend_curve *curve, double time_s, rend_moment *out)
     bool inside = find_segment(curve, time_s, &i);
     if (!inside) i = time_s >= curve->knots[last].key.time_s ? last : 0;
     const rend_key *key = &curve->knots[i].key;
-    *out = (rend_moment){.camera = key->camera, .budget_points = key->budget_points};
+    *out = (rend_moment){.camera = key->camera,
+                         .budget_points = key->budget_points,
+                         .has_clip = key->has_clip,
+                         .clip = key->clip};
     for (uint32_t j = i + 1; j-- > 0 && out->colour == NULL;)
         if (curve->knots[j].key.colour[0] != '\0') out->colour = curve->knots[j].key.colour;
     if (!inside || time_s == key->time_s) return;
     camera_at(curve, i, time_s, &out->camera);
     out->budget_points = budget_at(curve, i, time_s);
+    clip_at(curve, i, time_s, &out->clip);
 }
 
 double rend_curve_way(const rend_curve *curve, double time_s)

@@ -9,8 +9,9 @@
  * Where on the curve the eye is at a time is a monotone cubic (Fritsch and Carlson, 1980) of the
  * length of the way: the speed never jumps, the eye never goes back, and it eases in and out at
  * both ends. Between keyframes that stand in one place the angle takes the place of the way; a
- * pause stays a pause. Field of view, distance of the target and budget are monotone cubics of
- * time.
+ * pause stays a pause. Field of view, distance of the target, budget and the sides of the clip box
+ * are monotone cubics of time; where only one of two keyframes has a budget, a box or an end to one
+ * of its sides, that of the first stays until the second.
  *
  * Where all keyframes have the same up direction and none looks along it, the horizon stays level.
  * Pure; the same keyframes give the same cameras. */
@@ -24,6 +25,8 @@ typedef struct {
     rend_camera camera;
     uint64_t budget_points; /* 0: that of the recording; REND_ALL: no limit */
     const char *colour;     /* borrowed from the curve; NULL: that of the recording */
+    bool has_clip;          /* without one, that of the recording */
+    rend_box clip;
 } rend_moment;
 
 /* path     valid; not needed any more afterwards

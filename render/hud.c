@@ -19,6 +19,8 @@ static const char *const HELP[] = {
     "M  K               next colour map;  legend on and off",
     ", .                darker, brighter RGB",
     "L                  eye-dome lighting",
+    "V  shift V         cut away what is in front of the cursor;  show all again",
+    "Z  shift Z         narrower, wider field of view",
     "P                  save a picture",
     "T  J               take the view as a keyframe;  play them",
     "N  X  < >          next keyframe, delete it, move it in time",

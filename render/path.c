@@ -29,6 +29,8 @@ static const char *fault_of(const rend_key *key)
     if (c->up[0] == 0 && c->up[1] == 0 && c->up[2] == 0) return "the up direction is zero";
     if (!(c->fov_rad >= FOV_MIN_RAD && c->fov_rad <= FOV_MAX_RAD))
         return "the field of view is not between 1 and 170 degrees";
+    for (int a = 0; key->has_clip && a < 3; a++)
+        if (!(key->clip.low[a] <= key->clip.high[a])) return "its clip box ends before it begins";
     return NULL;
 }
 

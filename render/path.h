@@ -16,6 +16,8 @@ typedef struct {
     /* What colours show, as on the command line (render/choice.h); "": as at the keyframe before,
      * or as in the recording. */
     char colour[REND_COLOUR_NAME_SIZE];
+    bool has_clip; /* without one, that of the recording */
+    rend_box clip; /* infinite where a side is open */
 } rend_key;
 
 typedef struct {

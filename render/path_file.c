@@ -5,6 +5,7 @@
 
 #include <jansson.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,17 +88,33 @@ static bool read_colour(const reader *r, json_t *object, rend_key *out)
     return true;
 }
 
+static bool read_clip(const reader *r, json_t *object, rend_key *out)
+{
+    json_t *value = json_object_get(object, "clip");
+    if (value == NULL) return true;
+    bool ok = json_array_size(value) == 6;
+    for (size_t i = 0; ok && i < 6; i++) {
+        json_t *side = json_array_get(value, i);
+        double *to = i < 3 ? &out->clip.low[i] : &out->clip.high[i - 3];
+        ok = json_is_number(side) || json_is_null(side);
+        *to = json_is_null(side) ? (i < 3 ? -INFINITY : INFINITY) : json_number_value(side);
+    }
+    out->has_clip = ok;
+    return ok || fault(r, "must be six numbers, or null where a side is open", "clip");
+}
+
 static bool read_key(const reader *r, json_t *object, rend_key *out)
 {
-    static const char *const names[] = {"time", "eye",    "target", "up",
-                                        "fov",  "budget", "colour", NULL};
+    static const char *const names[] = {"time",   "eye",    "target", "up", "fov",
+                                        "budget", "colour", "clip",   NULL};
     double fov = FOV_DEFAULT_DEG;
     rend_key key = {.camera.up = {0, 0, 1}};
     if (!json_is_object(object)) return fault(r, "must be an object", "keys");
     if (!knows_all(r, object, names) || !read_real(r, object, "time", &key.time_s) ||
         !read_triple(r, object, "eye", key.camera.eye) ||
         !read_triple(r, object, "target", key.camera.target) ||
-        !read_budget(r, object, &key.budget_points) || !read_colour(r, object, &key))
+        !read_budget(r, object, &key.budget_points) || !read_colour(r, object, &key) ||
+        !read_clip(r, object, &key))
         return false;
     if (json_object_get(object, "up") != NULL && !read_triple(r, object, "up", key.camera.up))
         return false;
@@ -195,6 +212,16 @@ static void print_text(FILE *f, const char *name, const char *text)
     json_decref(json);
 }
 
+static void print_clip(FILE *f, const rend_box *clip)
+{
+    for (int i = 0; i < 6; i++) {
+        double side = i < 3 ? clip->low[i] : clip->high[i - 3];
+        fprintf(f, i == 0 ? ", \"clip\": [" : ", ");
+        fprintf(f, isfinite(side) ? "%.13g" : "null", side);
+    }
+    fputc(']', f);
+}
+
 static void print_key(FILE *f, const rend_key *key)
 {
     const rend_camera *c = &key->camera;
@@ -206,6 +233,7 @@ static void print_key(FILE *f, const rend_key *key)
     if (key->budget_points == REND_ALL) fprintf(f, ", \"budget\": \"all\"");
     else if (key->budget_points > 0) fprintf(f, ", \"budget\": %" PRIu64, key->budget_points);
     if (key->colour[0] != '\0') print_text(f, "colour", key->colour);
+    if (key->has_clip) print_clip(f, &key->clip);
     fprintf(f, "}");
 }
 

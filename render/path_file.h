@@ -4,11 +4,12 @@
  *
  *   {"format": "instantpoints camera path", "version": 1, "abrupt": false, "keys": [
  *     {"time": 0, "eye": [1, 2, 3], "target": [4, 5, 6], "up": [0, 0, 1], "fov": 60,
- *      "budget": 2000000, "colour": "rgb"}]}
+ *      "budget": 2000000, "colour": "rgb", "clip": [0, 0, null, 9, 9, 2.5]}]}
  *
  * Times in seconds, places in the coordinates of the scans, "fov" the vertical field of view in
- * degrees. "up", "fov", "budget" (a number or "all"), "colour" and "abrupt" may be left out. A
- * member that is not known is an error: it would be a misspelt one. */
+ * degrees, "clip" the box outside of which nothing is shown, low and high x, y, z, null where a
+ * side is open. "up", "fov", "budget" (a number or "all"), "colour", "clip" and "abrupt" may be
+ * left out. A member that is not known is an error: it would be a misspelt one. */
 #pragma once
 #include "render/path.h"
 

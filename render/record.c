@@ -78,6 +78,12 @@ static void print_text(FILE *f, const char *text)
     fputc('"', f);
 }
 
+static void print_clip(FILE *f, bool has_clip, const rend_box *clip)
+{
+    for (int a = 0; has_clip && a < 3; a++)
+        fprintf(f, ", \"%.17g to %.17g\"", clip->low[a], clip->high[a]);
+}
+
 static void print_key(FILE *f, const rend_key *key)
 {
     const double *e = key->camera.eye, *t = key->camera.target, *u = key->camera.up;
@@ -87,13 +93,8 @@ static void print_key(FILE *f, const rend_key *key)
             key->time_s, e[0], e[1], e[2], t[0], t[1], t[2], u[0], u[1], u[2], key->camera.fov_rad,
             key->budget_points);
     print_text(f, key->colour);
+    print_clip(f, key->has_clip, &key->clip);
     fprintf(f, "]");
-}
-
-static void print_clip(FILE *f, bool has_clip, const rend_box *clip)
-{
-    for (int a = 0; has_clip && a < 3; a++)
-        fprintf(f, ", \"%.17g to %.17g\"", clip->low[a], clip->high[a]);
 }
 
 static void print_look(FILE *f, const rend_look *look)
@@ -198,20 +199,35 @@ static rend_take_frame describe_frame(const recorder *r, uint64_t frame)
         .number = frame, .time_s = time_s, .fade = fade_at(r, frame), .title_s = time_s};
 }
 
+/* As in a path's file; nothing without a clip box. */
+static void print_sides(const rend_taken *taken, char *out, size_t size)
+{
+    size_t used = 0;
+    out[0] = '\0';
+    for (int i = 0; taken->has_clip && i < 6; i++) {
+        double side = i < 3 ? taken->clip.low[i] : taken->clip.high[i - 3];
+        used += (size_t)snprintf(out + used, size - used, i == 0 ? ", \"clip\": [" : ", ");
+        used += (size_t)snprintf(out + used, size - used, isfinite(side) ? "%.17g" : "null", side);
+    }
+    if (taken->has_clip) snprintf(out + used, size - used, "]");
+}
+
 static void write_note(const rend_take_frame *frame, const rend_taken *taken,
                        char note[REND_NOTE_SIZE])
 {
     const rend_camera *c = &taken->camera;
-    char budget[32] = "null";
+    char budget[32] = "null", clip[192];
+    print_sides(taken, clip, sizeof clip);
     if (taken->budget_points != REND_ALL)
         snprintf(budget, sizeof budget, "%" PRIu64, taken->budget_points);
     snprintf(note, REND_NOTE_SIZE,
              "{\"frame\": %" PRIu64 ", \"time\": %.17g, \"points\": %" PRIu64
              ", \"budget\": %s, \"nodes\": %u, \"missing\": %u, \"eye\": [%.17g, %.17g, %.17g], "
-             "\"target\": [%.17g, %.17g, %.17g], \"up\": [%.17g, %.17g, %.17g], \"fov\": %.17g}",
+             "\"target\": [%.17g, %.17g, %.17g], \"up\": [%.17g, %.17g, %.17g], \"fov\": %.17g%s}",
              frame->number, frame->time_s, taken->points_drawn, budget, taken->nodes_drawn,
              taken->pending, c->eye[0], c->eye[1], c->eye[2], c->target[0], c->target[1],
-             c->target[2], c->up[0], c->up[1], c->up[2], c->fov_rad * 180 / 3.14159265358979323846);
+             c->target[2], c->up[0], c->up[1], c->up[2], c->fov_rad * 180 / 3.14159265358979323846,
+             clip);
 }
 
 static bool tell(recorder *r, const rend_take_frame *frame, const rend_taken *taken, mospt_err *err)

@@ -195,6 +195,7 @@ bool rend_take_view(const rend_take *take, const rend_curve *curve, double time_
     out->width = take->pass_width * take->samples, out->height = take->pass_height * take->samples;
     out->look = o->look;
     if (moment.colour != NULL) show_colours(moment.colour, &out->look);
+    if (moment.has_clip) out->look.has_clip = true, out->look.clip = moment.clip;
     out->budget_points = budget == REND_ALL ? REND_ALL : budget / take->views;
     out->min_node_px = o->limits.min_node_px;
     if (o->panorama) {
@@ -323,7 +324,10 @@ bool rend_take_run(rend_take *take, const rend_curve *curve, const rend_take_fra
     rend_moment moment;
     rend_taken now = {0};
     rend_curve_at(curve, frame->time_s, &moment);
-    *out = (rend_taken){.camera = moment.camera, .budget_points = budget_of(take, &moment)};
+    *out = (rend_taken){.camera = moment.camera,
+                        .has_clip = moment.has_clip || take->options.look.has_clip,
+                        .clip = moment.has_clip ? moment.clip : take->options.look.clip,
+                        .budget_points = budget_of(take, &moment)};
     if (!take->direct)
         memset(take->sums, 0,
                (size_t)take->canvas_width * take->canvas_height * 3 * sizeof *take->sums);

@@ -43,6 +43,8 @@ typedef struct {
     uint64_t budget_points; /* in force; REND_ALL: none */
     uint32_t nodes_drawn;   /* of the same sub-frame */
     rend_camera camera;     /* at the frame's time */
+    bool has_clip;
+    rend_box clip;
     uint32_t pending;       /* live: nodes that were missing */
 } rend_taken;
 

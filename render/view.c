@@ -24,6 +24,9 @@ enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
 #define FLY_FASTER 4
 #define ZOOM_PER_STEP 0.85
+#define RAD_PER_DEG (3.14159265358979323846 / 180)
+#define FOV_MIN_RAD (5 * RAD_PER_DEG) /* of the lens */
+#define FOV_MAX_RAD (120 * RAD_PER_DEG)
 #define TURN_RAD_PER_PX 0.006 /* at 720 lines: half a turn for three quarters of the height */
 
 typedef struct {
@@ -121,11 +124,24 @@ static rend_key key_of_view(const viewer *v)
         snprintf(key.colour, sizeof key.colour, "%s",
                  look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute
                                                        : rend_choice_name(look->colour));
+    key.clip = look->has_clip ? look->clip : rend_clip_open();
+    key.has_clip =
+        look->has_clip != v->options->look.has_clip ||
+        (look->has_clip && memcmp(&look->clip, &v->options->look.clip, sizeof look->clip) != 0);
     return key;
 }
 
-/* colour   NULL or "": as it is */
-static void look_through(viewer *v, const rend_camera *camera, const char *colour)
+static void tell_of_strip(viewer *v)
+{
+    if (v->strip.notice[0] != '\0') tell(v, v->strip.notice);
+    v->strip.notice[0] = '\0';
+    v->dirty = true;
+}
+
+/* colour   NULL or "": as it is
+ * clip     NULL: as when the window opened */
+static void look_through(viewer *v, const rend_camera *camera, const char *colour,
+                         const rend_box *clip)
 {
     if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
     v->view.camera = *camera;
@@ -134,16 +150,16 @@ static void look_through(viewer *v, const rend_camera *camera, const char *colou
         v->view.look.colour = v->choices[i].colour;
         v->view.look.attribute = v->choices[i].attribute;
     }
-    if (v->strip.notice[0] != '\0') tell(v, v->strip.notice);
-    v->strip.notice[0] = '\0';
-    v->dirty = true;
+    v->view.look.has_clip = clip != NULL || v->options->look.has_clip;
+    v->view.look.clip = clip != NULL ? *clip : v->options->look.clip;
+    tell_of_strip(v);
 }
 
 static bool press_strip_key(viewer *v, const rgl_event *e)
 {
     rend_key key = key_of_view(v);
     if (!rend_strip_press(&v->strip, e->key, e->shift, rgl_window_seconds(), &key)) return false;
-    look_through(v, &key.camera, key.colour);
+    look_through(v, &key.camera, key.colour, key.has_clip ? &key.clip : NULL);
     return true;
 }
 
@@ -154,14 +170,14 @@ static bool grip_strip(viewer *v, const rgl_event *e)
     float line = v->text != NULL ? rgl_text_metrics(v->text).line : TEXT_PX;
     if (!rend_strip_grip(&v->strip, e->x, e->y, v->view.width, v->view.height, line, &key))
         return false;
-    look_through(v, &key.camera, key.colour);
+    look_through(v, &key.camera, key.colour, key.has_clip ? &key.clip : NULL);
     return true;
 }
 
 static void release_strip(viewer *v)
 {
     rend_strip_release(&v->strip);
-    look_through(v, &v->view.camera, NULL);
+    tell_of_strip(v);
 }
 
 static void move_cursor(viewer *v, const rgl_event *e)
@@ -270,6 +286,32 @@ static void press_look_key(viewer *v, int key, bool shift)
     else press_colour_key(v, key, shift);
 }
 
+/* Looks into the site: what is in front of the point under the cursor goes, along the axis that the
+ * eye looks along most. */
+static void cut(viewer *v, bool undo)
+{
+    rend_look *look = &v->view.look;
+    double place[3], right[3], up[3], back[3];
+    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place)) {
+        tell(v, "nothing to cut at under the cursor");
+        return;
+    }
+    if (!look->has_clip || undo) look->clip = rend_clip_open();
+    look->has_clip = !undo;
+    rend_camera_axes(&v->view.camera, right, up, back);
+    if (!undo) rend_clip_cut(back, place, &look->clip);
+}
+
+static void change_lens(viewer *v, double factor)
+{
+    char text[64];
+    double fov_rad = fmin(fmax(v->view.camera.fov_rad * factor, FOV_MIN_RAD), FOV_MAX_RAD);
+    v->view.camera.fov_rad = fov_rad;
+    snprintf(text, sizeof text, "field of view %.0f degrees", fov_rad / RAD_PER_DEG);
+    tell(v, text);
+    touch_camera(v);
+}
+
 static void press_key(viewer *v, const rgl_event *e)
 {
     v->dirty = true;
@@ -280,6 +322,8 @@ static void press_key(viewer *v, const rgl_event *e)
     else if (e->key == 'B') scale_budget(v, e->shift ? 0.5 : 2);
     else if (e->key == ']') scale_budget(v, 1.25);
     else if (e->key == '[') scale_budget(v, 0.8);
+    else if (e->key == 'V') cut(v, e->shift);
+    else if (e->key == 'Z') change_lens(v, e->shift ? 1.25 : 0.8);
     else if (e->key == 'P') save_picture(v);
     else if (e->key == 'F') rgl_window_toggle_fullscreen(v->window);
     else press_look_key(v, e->key, e->shift);
@@ -343,7 +387,8 @@ static bool fly(viewer *v)
 static void play(viewer *v)
 {
     rend_moment m;
-    if (rend_strip_play(&v->strip, rgl_window_seconds(), &m)) look_through(v, &m.camera, m.colour);
+    if (rend_strip_play(&v->strip, rgl_window_seconds(), &m))
+        look_through(v, &m.camera, m.colour, m.has_clip ? &m.clip : NULL);
 }
 
 /* ---- frames ---- */

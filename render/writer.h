@@ -5,7 +5,7 @@
 #pragma once
 #include "render/reel.h"
 
-enum { REND_NOTE_SIZE = 768 };
+enum { REND_NOTE_SIZE = 1024 };
 
 typedef struct rend_writer rend_writer;
 

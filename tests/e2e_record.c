@@ -142,6 +142,12 @@ static void every_frame_is_the_shot_of_its_camera(void **unused)
     rend_curve *curve;
     rend_record_result result;
     scene_make(&s);
+    const mospt_metadata *site = &s.site.dataset->metadata;
+    for (int i = 1; i < 4; i++) {
+        s.path.keys[i].has_clip = true;
+        s.path.keys[i].clip = (rend_box){{-INFINITY, -INFINITY, -INFINITY},
+                                         {INFINITY, INFINITY, site->high[2] / i}};
+    }
     CORE_NEED(rend_curve_create(&s.path, &curve, &err));
     char *film = core_path(s.site.folder, "f.png"), *shot = core_path(s.site.folder, "shot.png");
     rend_record_options options = options_for(&s.path, film);
@@ -157,6 +163,7 @@ static void every_frame_is_the_shot_of_its_camera(void **unused)
                                  .width = WIDTH,
                                  .height = HEIGHT,
                                  .limits = {.budget_points = BUDGET},
+                                 .look = {.has_clip = m.has_clip, .clip = m.clip},
                                  .camera = {.has_eye = true,
                                             .has_target = true,
                                             .has_up = true,

@@ -63,11 +63,33 @@ static void cubes_miss_a_box_by_one_step(void **unused)
     }
 }
 
+static void cutting_moves_the_side_that_faces_the_eye(void **unused)
+{
+    (void)unused;
+    const double place[3] = {1, 2, 3};
+    for (int a = 0; a < 3; a++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double back[3] = {0.3, -0.3, 0.3};
+            rend_box box = rend_clip_open();
+            back[a] = sign;
+            rend_clip_cut(back, place, &box);
+            for (int b = 0; b < 3; b++) {
+                assert_true(box.high[b] == (b == a && sign > 0 ? place[b] : INFINITY));
+                assert_true(box.low[b] == (b == a && sign < 0 ? place[b] : -INFINITY));
+            }
+        }
+    rend_box other = {{5, 5, 5}, {6, 6, 6}};
+    const double back[3] = {0, 0, 1};
+    rend_clip_cut(back, place, &other); /* all of it would be gone */
+    assert_true(other.high[2] == 3 && isinf(other.low[2]));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(coordinates_are_inside_of_their_own_box),
         cmocka_unit_test(open_sides_hold_everything_and_boxes_elsewhere_nothing),
+        cmocka_unit_test(cutting_moves_the_side_that_faces_the_eye),
         cmocka_unit_test(cubes_miss_a_box_by_one_step),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

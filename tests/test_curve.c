@@ -249,6 +249,38 @@ static void what_a_keyframe_sets_holds_until_another_does(void **unused)
     rend_path_fini(&path);
 }
 
+static void clip_boxes_move_where_both_keyframes_have_an_end(void **unused)
+{
+    (void)unused;
+    rend_path path = {0};
+    const double far[3] = {99, 9, 0};
+    for (int i = 0; i < 5; i++) {
+        const double eye[3] = {i, 0, 0};
+        add(&path, i, eye, far);
+        path.keys[i].has_clip = i >= 1;
+        path.keys[i].clip = (rend_box){{0, 0, 0}, {10 * i, INFINITY, i == 3 ? INFINITY : 1}};
+    }
+    rend_curve *curve = curve_of(&path);
+    rend_moment m, later;
+    rend_curve_at(curve, 0.99, &m);
+    assert_false(m.has_clip);
+    rend_curve_at(curve, 1, &m);
+    assert_true(m.has_clip && m.clip.high[0] == 10);
+    double before = 0;
+    for (double t = 1; t <= 4; t += 0.01, before = m.clip.high[0]) {
+        rend_curve_at(curve, t, &m);
+        assert_true(m.has_clip && m.clip.high[0] >= before && isinf(m.clip.high[1]));
+        assert_true(m.clip.low[0] == 0 &&
+                    (t < 3 || t >= 4 ? m.clip.high[2] == 1 : isinf(m.clip.high[2])));
+    }
+    /* In the middle of a steady motion it does not halt at a keyframe. */
+    rend_curve_at(curve, 2.01, &m);
+    rend_curve_at(curve, 2.02, &later);
+    assert_true(fabs(later.clip.high[0] - m.clip.high[0] - 0.1) < 0.02);
+    rend_curve_destroy(curve);
+    rend_path_fini(&path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -260,6 +292,7 @@ int main(void)
         cmocka_unit_test(a_pause_rests_and_speed_is_zero_around_it),
         cmocka_unit_test(a_rolled_camera_keeps_its_roll),
         cmocka_unit_test(what_a_keyframe_sets_holds_until_another_does),
+        cmocka_unit_test(clip_boxes_move_where_both_keyframes_have_an_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,6 +37,10 @@ static void a_path_comes_back_as_it_was_written(void **unused)
             key.camera.eye[a] = 5e6 * core_unit(&state), key.camera.target[a] = core_unit(&state);
         if (i % 3 == 1) key.budget_points = 1 + core_below(&state, 1000000);
         if (i % 3 == 2) key.budget_points = REND_ALL;
+        key.has_clip = i % 5 > 2;
+        for (int a = 0; key.has_clip && a < 3; a++)
+            key.clip.low[a] = i % 5 == 3 ? -INFINITY : 5e6 * core_unit(&state),
+            key.clip.high[a] = a == 1 ? INFINITY : 6e6;
         if (i % 4 == 0) strcpy(key.colour, i == 0 ? "an \"odd\" name:2" : "elevation");
         CORE_NEED(rend_path_add(&path, &key, NULL, &err));
     }
@@ -55,6 +59,13 @@ static void a_path_comes_back_as_it_was_written(void **unused)
         assert_true(fabs(a->camera.fov_rad - b->camera.fov_rad) < 1e-8);
         assert_true(a->budget_points == b->budget_points);
         assert_string_equal(a->colour, b->colour);
+        assert_true(a->has_clip == b->has_clip);
+        for (int x = 0; a->has_clip && x < 3; x++) {
+            if (isinf(a->clip.low[x])) assert_true(a->clip.low[x] == b->clip.low[x]);
+            else assert_near(a->clip.low[x], b->clip.low[x]);
+            if (isinf(a->clip.high[x])) assert_true(a->clip.high[x] == b->clip.high[x]);
+            else assert_near(a->clip.high[x], b->clip.high[x]);
+        }
     }
     rend_path_fini(&path);
     rend_path_fini(&back);
@@ -102,6 +113,12 @@ static void every_malformed_member_is_a_format_error(void **unused)
         "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], \"budget\": \"most\"}]",
         "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], \"colour\": \"\"}]",
         "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], \"color\": \"rgb\"}]",
+        "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], \"clip\": [1,2,3]}]",
+        "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], \"clip\": null}]",
+        "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], "
+        "\"clip\": [1,2,3,4,5,\"6\"]}]",
+        "\"keys\": [{\"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6], "
+        "\"clip\": [1,2,3,4,5,2]}]",
         "\"keys\": [{\"time\": 1, \"eye\": [1,2,3], \"target\": [4,5,6]},"
         " {\"time\": 1, \"eye\": [1,2,3], \"target\": [4,5,6]}]",
         "\"keys\": [{\"time\": 0, \"time\": 0, \"eye\": [1,2,3], \"target\": [4,5,6]}]",
