@@ -2,6 +2,7 @@
 
 #include "render/choice.h"
 #include "render/ramp.h"
+#include "render/shading.h"
 
 #include <ctype.h>
 #include <getopt.h>
@@ -315,6 +316,80 @@ static bool o_legend(cli_options *o, const char *v)
     return (void)v, o->legend = true;
 }
 
+static bool o_shape(cli_options *o, const char *v)
+{
+    return rend_shading_shape_from_name(v, &o->look.shape);
+}
+
+static bool read_real_float(const char *v, double low, double high, float *out)
+{
+    double value;
+    if (!read_real(v, low, high, &value)) return false;
+    *out = (float)value;
+    return true;
+}
+
+static bool o_blend(cli_options *o, const char *v)
+{
+    return read_real_float(v, 0, 1, &o->look.blend_slab) &&
+           (o->look.blend_slab == 0 || o->look.blend_slab >= 1e-4f);
+}
+static bool o_fill(cli_options *o, const char *v)
+{
+    return read_u32(v, 0, REND_FILL_PX_MAX, &o->look.fill_px);
+}
+static bool o_edl_strength(cli_options *o, const char *v)
+{
+    o->look.no_edl = strcmp(v, "0") == 0;
+    return o->look.no_edl || read_real_float(v, 0.01, 100, &o->look.edl_strength);
+}
+static bool o_edl_radius(cli_options *o, const char *v)
+{
+    return read_real_float(v, 1, 100, &o->look.edl_radius_px);
+}
+static bool o_point_min(cli_options *o, const char *v)
+{
+    return read_real_float(v, 1, 64, &o->look.point_px_min);
+}
+static bool o_point_max(cli_options *o, const char *v)
+{
+    return read_real_float(v, 1, 64, &o->look.point_px_max);
+}
+
+/* A name or six hexadecimal digits; ends at a comma or at the end. */
+static bool read_rgb(const char *v, float out[3], const char **end)
+{
+    static const struct {
+        const char *name;
+        unsigned rgb;
+    } names[] = {{"black", 0x000000}, {"white", 0xffffff}, {"grey", 0x808080}, {"sky", 0x87a5c7}};
+    unsigned rgb = 0;
+    size_t length = strcspn(v, ",");
+    int used = 0;
+    bool known = false;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strlen(names[i].name) == length && strncmp(names[i].name, v, length) == 0)
+            rgb = names[i].rgb, known = true;
+    const char *digits = v[0] == '#' ? v + 1 : v;
+    known = known || (sscanf(digits, "%6x%n", &rgb, &used) == 1 && used == 6 &&
+                      digits + used == v + length && isxdigit((unsigned char)digits[0]) &&
+                      isxdigit((unsigned char)digits[1]));
+    for (int c = 0; c < 3; c++)
+        out[c] = (float)(rgb >> (16 - 8 * c) & 255) / 255;
+    *end = v + length;
+    return known;
+}
+
+static bool o_background(cli_options *o, const char *v)
+{
+    float *top = o->look.background_top, *bottom = o->look.background_bottom;
+    const char *end;
+    o->look.has_background = true;
+    if (!read_rgb(v, top, &end)) return false;
+    if (*end == '\0') return memcpy(bottom, top, 3 * sizeof *top), true;
+    return read_rgb(end + 1, bottom, &end) && *end == '\0';
+}
+
 static bool o_path(cli_options *o, const char *v)
 {
     return (o->camera_path = v)[0] != '\0';
@@ -472,6 +547,15 @@ static const struct {
      "nodes that are smaller on the screen are not drawn (default: by detail)"},
     {"point-size", "SIZE", 0, V | S | R, o_point_size,
      "pixels, as in 2; metres, as in 0.01m; or auto (default)"},
+    {"point-min", "PX", 0, V | S | R, o_point_min, "no splat is smaller (default: 1)"},
+    {"point-max", "PX", 0, V | S | R, o_point_max, "no splat is larger (default: 6)"},
+    {"shape", "NAME", 0, V | S | R, o_shape,
+     "of splats: square, round, paraboloid (they cut each other sharply) or auto (default)"},
+    {"blend", "SHARE", 0, V | S | R, o_blend,
+     "average points up to this share of the distance behind the nearest, as in 0.01; for noisy "
+     "scans (default: 0)"},
+    {"fill", "PX", 0, V | S | R, o_fill,
+     "close holes in near surfaces from so many pixels around, up to 8 (default: 0)"},
     {"color", "BY", 0, V | S | R, o_colour,
      "rgb (default), intensity, elevation, classification, return, time, scan, density, distance, "
      "or "
@@ -488,6 +572,12 @@ static const struct {
     {"no-edl", NULL, 0, V | S | R, o_no_edl, "without eye-dome lighting"},
     {"clip", "BOX", 0, V | S | R, o_clip,
      "show only what is inside X0,Y0,Z0,X1,Y1,Z1; -inf or inf where a side is open"},
+    {"edl-strength", "FACTOR", 0, V | S | R, o_edl_strength,
+     "how dark eye-dome lighting draws edges (default: 1)"},
+    {"edl-radius", "PX", 0, V | S | R, o_edl_radius,
+     "how far it looks (default: 1 for each 720 pixels of the height)"},
+    {"background", "COLOURS", 0, V | S | R, o_background,
+     "one, or top and bottom: names or RRGGBB, as in white or 203040,000000 (default: grey)"},
     {"size", "WxH", 0, V | S | R, o_size, "of the picture or window, pixels (default: 1280x720)"},
     {"eye", "X,Y,Z", 0, V | S, o_eye, "where the camera stands, in the coordinates of the scans"},
     {"target", "X,Y,Z", 0, V | S, o_target, "what it looks at"},

@@ -4,7 +4,8 @@
  * are: of the hands, hand h holds points h, h + 16, h + 32 ... of the Morton order, and the hands
  * follow each other in bit-reversed order (0 8 4 12 2 ...). A whole hand, and any number of them,
  * is spread like the level itself, and begins a prefix whose density is even to a 16th of the
- * level; each hand is in Morton order still, for caches and for whoever wants to code differences. */
+ * level; each hand is in Morton order still, for caches and for whoever wants to code differences.
+ */
 #pragma once
 #include <stdint.h>
 

@@ -4,8 +4,8 @@
  * original points below it, the one whose colour is nearest to the average of its children; a point
  * stands in the coarsest level that it represents. So the first level_end[i] points are level i:
  * exactly one point for each occupied cell of depth i. Points that share a finest cell with another
- * one (octants that add, section 4.6) follow in one more level, depth + 1. What a level adds is dealt
- * (mospt/deal.h), so that a prefix that ends inside of it is even, too. */
+ * one (octants that add, section 4.6) follow in one more level, depth + 1. What a level adds is
+ * dealt (mospt/deal.h), so that a prefix that ends inside of it is even, too. */
 #pragma once
 #include "mospt/hierarchy.h"
 #include "mospt/point.h"

@@ -206,8 +206,8 @@ static uint32_t place_in_level(const large *l, uint32_t level, uint32_t k)
     return begin + mospt_deal_place(&deal, k);
 }
 
-/* Writes what level i of a cell adds. The Morton order of the node's level is that of the cells, one
- * after the other, so that a hand of the cell goes to one hand of the node, in one piece. */
+/* Writes what level i of a cell adds. The Morton order of the node's level is that of the cells,
+ * one after the other, so that a hand of the cell goes to one hand of the node, in one piece. */
 static bool write_level(large *l, const cell *c, const uint8_t *payload, uint32_t i, mospt_err *err)
 {
     uint32_t begin = c->level_end[i - 1], count = c->level_end[i] - begin, level = l->cut + i;
@@ -245,8 +245,8 @@ static bool make_node(large *l, mospt_err *err)
     };
     if (!divide(l, err) || !make_all(l, note_cell, err) || !sum_up(l, err)) return false;
     l->node.payload_size = l->node.count * stride;
-    if (!mospt_writer_place(l->env->writer, &l->node, &index, err) || !make_all(l, write_cell, err) ||
-        !mospt_writer_hash(l->env->writer, &l->node, err))
+    if (!mospt_writer_place(l->env->writer, &l->node, &index, err) ||
+        !make_all(l, write_cell, err) || !mospt_writer_hash(l->env->writer, &l->node, err))
         return false;
     mospt_writer_complete(l->env->writer, index, &l->node, l->points_hash);
     return l->env->report(l->env->report_context) ||

@@ -57,11 +57,25 @@ typedef enum {
     REND_SIZE_WORLD, /* point_m metres for every point, section 3 */
 } rend_size_mode;
 
+/* What a splat that is wide enough looks like, see render/gl/rgl.h. */
+typedef enum {
+    REND_SHAPE_AUTO,
+    REND_SHAPE_SQUARE,
+    REND_SHAPE_ROUND,
+    REND_SHAPE_PARABOLOID, /* bent away from the eye: splats cut each other halfway */
+    REND_SHAPE_COUNT
+} rend_shape;
+
 typedef struct {
     rend_size_mode size_mode;
     float point_px;     /* REND_SIZE_FIXED; 0: 1 */
     float point_m;      /* REND_SIZE_WORLD, in the unit of the world coordinates */
+    float point_px_min; /* no splat is smaller; 0: 1 */
     float point_px_max; /* no splat is larger; 0: REND_POINT_PX_MAX_DEFAULT */
+    rend_shape shape;
+    float blend_slab; /* points that are farther than the nearest by this share of its distance are
+                         averaged with it; 0: none are */
+    uint32_t fill_px; /* holes up to about twice as wide are closed from their borders; 0: off */
     rend_colour colour;
     const char *attribute; /* REND_COLOUR_ATTRIBUTE: its name, borrowed; "NAME:2" is the second of
                               its components */
@@ -81,6 +95,7 @@ typedef struct {
 } rend_look;
 
 #define REND_POINT_PX_MAX_DEFAULT 6.0f
+#define REND_FILL_PX_MAX 8
 
 typedef struct {
     uint64_t budget_points; /* points drawn in one frame; 0: all in a shot, REND_VIEW_BUDGET_DEFAULT

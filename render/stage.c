@@ -14,14 +14,17 @@ enum {
     LOADER_THREADS = 2,
     TAKE_MAX = 32,
 };
+/* What is drawn alike: splats of the least width, those that are squares for being small, others.
+ */
+enum { GROUP_SMALLEST, GROUP_SMALL, GROUP_WIDE, GROUPS };
 /* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
 #define UPLOAD_BYTES_PER_FRAME (64 * REND_MIB)
 #define WAITING_BYTES_MAX (128 * REND_MIB)
 /* Points of neighbouring cells are up to two cells apart: splats this much wider than a cell leave
  * few holes. */
 #define SPLAT_PER_CELL 1.25f
-/* Wider ones are discs: up to three pixels nobody tells the two apart, and a disc costs the early
- * depth test. */
+/* Wider ones are discs, if nobody asks for anything else: up to three pixels nobody tells the two
+ * apart, and a disc costs the early depth test. */
 #define SQUARE_PX_MAX 3.0f
 
 struct rend_stage {
@@ -52,8 +55,8 @@ struct rend_stage {
     uint32_t *wanted;       /* [node count], owned: what to ask the loader for */
     int32_t *first, *count; /* [range_capacity], owned */
     uint32_t range_count, range_capacity;
-    rgl_batch batches[2]; /* squares, discs */
-    uint32_t batch_start[2], batch_count;
+    rgl_batch batches[GROUPS];
+    uint32_t batch_start[GROUPS], batch_count;
 
     rend_frame frame;
     rend_clip clip; /* of the selection, if the view has one */
@@ -307,17 +310,38 @@ static float point_px_max(const rend_look *look)
     return look->point_px_max > 0 ? fmaxf(look->point_px_max, 1) : REND_POINT_PX_MAX_DEFAULT;
 }
 
-static bool is_round(const rend_look *look, const rend_draw *d)
+static float point_px_min(const rend_look *look)
 {
-    float widest = look->size_mode == REND_SIZE_AUTO ? SPLAT_PER_CELL * d->widest_px : INFINITY;
-    return fminf(widest, point_px_max(look)) > SQUARE_PX_MAX;
+    if (look->size_mode == REND_SIZE_FIXED) return point_px_max(look);
+    return fminf(fmaxf(look->point_px_min, 1), point_px_max(look));
 }
 
-/* Squares before discs, and then the order of the selection. This order, not the one in which nodes
- * were read, decides which of two points at the same depth is seen. */
+static int group_of(const rend_look *look, const rend_draw *d)
+{
+    float widest = look->size_mode == REND_SIZE_AUTO ? SPLAT_PER_CELL * d->widest_px : INFINITY;
+    widest = fminf(widest, point_px_max(look));
+    if (widest <= point_px_min(look)) return GROUP_SMALLEST;
+    return widest > SQUARE_PX_MAX ? GROUP_WIDE : GROUP_SMALL;
+}
+
+static rgl_batch batch_of(const rend_look *look, int group)
+{
+    static const rgl_shape shapes[] = {[REND_SHAPE_SQUARE] = RGL_SQUARE,
+                                       [REND_SHAPE_ROUND] = RGL_ROUND,
+                                       [REND_SHAPE_PARABOLOID] = RGL_PARABOLOID};
+    bool narrow =
+        group == GROUP_SMALL || (group == GROUP_SMALLEST && point_px_min(look) <= SQUARE_PX_MAX);
+    return (rgl_batch){.shape = look->shape != REND_SHAPE_AUTO ? shapes[look->shape]
+                                : narrow                       ? RGL_SQUARE
+                                                               : RGL_ROUND,
+                       .smallest = group == GROUP_SMALLEST};
+}
+
+/* By group, and then the order of the selection. This order, not the one in which nodes were read,
+ * decides which of two points at the same depth is seen. */
 static uint64_t key_of(const rend_look *look, const rend_draw *d, uint32_t index)
 {
-    return (uint64_t)is_round(look, d) << 32 | index;
+    return (uint64_t)group_of(look, d) << 32 | index;
 }
 
 static int compare_keys(const void *a, const void *b)
@@ -381,15 +405,16 @@ static bool add_node(rend_stage *s, const rend_draw *d, mospt_err *err)
 }
 
 /* Batches of the draws from .. to - 1 of the order that are on the GPU. */
-static bool make_batches(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
+static bool make_batches(rend_stage *s, const rend_look *look, uint32_t from, uint32_t to,
+                         mospt_err *err)
 {
     s->range_count = s->batch_count = 0;
     for (uint32_t i = from; i < to; i++) {
         const rend_draw *d = draw_at(s, i);
-        bool round = s->order[i] >> 32 != 0;
-        if (s->batch_count == 0 || s->batches[s->batch_count - 1].round != round) {
+        int group = (int)(s->order[i] >> 32);
+        if (i == from || group != (int)(s->order[i - 1] >> 32)) {
             s->batch_start[s->batch_count] = s->range_count;
-            s->batches[s->batch_count++] = (rgl_batch){.round = round};
+            s->batches[s->batch_count++] = batch_of(look, group);
         }
         if (s->residency[d->node] != REND_RESIDENT) continue;
         if (!add_node(s, d, err)) return false;
@@ -419,8 +444,10 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
         .splat_size = look->size_mode == REND_SIZE_WORLD
                           ? (float)(look->point_m / s->dataset->metadata.grid.step)
                           : 0,
-        .px_min = look->size_mode == REND_SIZE_FIXED ? point_px_max(look) : 1,
+        .px_min = point_px_min(look),
         .px_max = point_px_max(look),
+        .blend_slab = look->blend_slab,
+        .fill_px = look->fill_px,
         .edl_strength = look->no_edl ? 0 : (look->edl_strength > 0 ? look->edl_strength : 1) * 24,
         .edl_radius_px =
             look->edl_radius_px > 0 ? look->edl_radius_px : fmaxf(1, (float)view->height / 720),
@@ -526,11 +553,10 @@ bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress
     unpin_all(stage);
     for (uint32_t i = 0; i < stage->selection->draw_count; i++)
         if (!pin(stage, stage->selection->draws[i].node, err)) return false;
-    if (!make_batches(stage, 0, stage->selection->draw_count, err)) return false;
+    if (!make_batches(stage, &view->look, 0, stage->selection->draw_count, err)) return false;
     rgl_scene scene = make_scene(stage, view);
-    if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count,
-                  RGL_BEGIN | RGL_END | view->parts, err))
-        return false;
+    int parts = RGL_BEGIN | RGL_END | view->parts | (scene.blend_slab > 0 ? RGL_AGAIN : 0);
+    if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count, parts, err)) return false;
     return fetch(stage, progress, err);
 }
 
@@ -620,24 +646,38 @@ bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *e
     return rend_loader_request(stage->loader, stage->wanted, wanted, err);
 }
 
+/* Draws everything through the GPU cache, in as many parts as that needs.
+ * first, last  flags for the first and the last of them, besides those for all */
+static bool draw_all(rend_stage *s, const rend_view_of *view, int first, int all, int last,
+                     mospt_err *err)
+{
+    rgl_scene scene = make_scene(s, view);
+    uint32_t total = s->selection->draw_count, from = 0;
+    s->figures.points_drawn = 0;
+    s->figures.nodes_drawn = 0;
+    do {
+        uint32_t to = end_of_chunk(s, from);
+        int parts = all | (from == 0 ? first : 0) | (to == total ? last : 0);
+        if (!bring(s, from, to, err) || !make_batches(s, &view->look, from, to, err)) return false;
+        if (!rgl_draw(s->gl, &scene, s->batches, s->batch_count, parts, err)) return false;
+        from = to;
+    } while (from < total);
+    return true;
+}
+
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
     if (!is_expected(stage, view) &&
         (!use_colours(stage, &view->look, err) || !select_view(stage, view, true, err)))
         return false;
     stage->has_expected = false;
-    rgl_scene scene = make_scene(stage, view);
-    uint32_t total = stage->selection->draw_count, from = 0;
-    int parts = RGL_BEGIN | view->parts;
-    do {
-        uint32_t to = end_of_chunk(stage, from);
-        if (!bring(stage, from, to, err) || !make_batches(stage, from, to, err)) return false;
-        if (to == total) parts |= RGL_END;
-        if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count, parts, err))
-            return false;
-        parts &= ~RGL_BEGIN;
-        from = to;
-    } while (from < total);
+    bool blend = view->look.blend_slab > 0;
+    bool ok;
+    if (blend && end_of_chunk(stage, 0) < stage->selection->draw_count)
+        ok = draw_all(stage, view, RGL_BEGIN, view->parts, 0, err) &&
+             draw_all(stage, view, 0, view->parts | RGL_AGAIN, RGL_END, err);
+    else ok = draw_all(stage, view, RGL_BEGIN | (blend ? RGL_AGAIN : 0), view->parts, RGL_END, err);
+    if (!ok) return false;
     unpin_all(stage);
     stage->figures.pending = 0;
     return true;

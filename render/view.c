@@ -5,6 +5,7 @@
 #include "render/hud.h"
 #include "render/image.h"
 #include "render/orbit.h"
+#include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
 
@@ -281,9 +282,8 @@ static void press_look_key(viewer *v, int key, bool shift)
     if (key == '+') scale_points(v, 1);
     else if (key == '-') scale_points(v, -1);
     else if (key == '0') look->size_mode = REND_SIZE_AUTO;
-    else if (key == 'L') look->no_edl = !look->no_edl;
     else if (key == 'K') v->no_legend = !v->no_legend;
-    else press_colour_key(v, key, shift);
+    else if (!rend_shading_press(look, key, shift)) press_colour_key(v, key, shift);
 }
 
 /* Looks into the site: what is in front of the point under the cursor goes, along the axis that the
@@ -407,7 +407,7 @@ static void fit_text(viewer *v)
 
 static bool draw_words(viewer *v, mospt_err *err)
 {
-    char look[64];
+    char look[160], shading[96];
     const rend_look *l = &v->view.look;
     rend_hud hud = {.frame_ms = v->frame_ms,
                     .budget_points = v->view.budget_points,
@@ -416,10 +416,12 @@ static bool draw_words(viewer *v, mospt_err *err)
     const char *colours =
         l->colour == REND_COLOUR_ATTRIBUTE ? l->attribute : rend_choice_name(l->colour);
     if (v->text == NULL) return true;
+    rend_shading_text(l, shading, sizeof shading);
     if (!v->no_legend) hud.legend = rend_stage_legend(v->stage);
     if (l->size_mode == REND_SIZE_FIXED)
-        snprintf(look, sizeof look, "%s  %g px", colours, (double)fmaxf(l->point_px, 1));
-    else snprintf(look, sizeof look, "%s", colours);
+        snprintf(look, sizeof look, "%s  %g px  %s", colours, (double)fmaxf(l->point_px, 1),
+                 shading);
+    else snprintf(look, sizeof look, "%s  %s", colours, shading);
     hud.look = look;
     rend_stage_figures(v->stage, &hud.figures);
     return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err) &&

@@ -138,6 +138,47 @@ static void frames_converge_to_the_still(void **unused)
     render_site_fini(&site);
 }
 
+static rgl_record blended(const render_site *site, uint64_t gpu, bool frames)
+{
+    scene s;
+    rend_progress progress;
+    rend_figures figures;
+    mospt_err err = {0};
+    const rend_limits limits = {.gpu_cache_bytes = gpu};
+    start(site, &limits, &s);
+    s.view.look.blend_slab = 0.01f;
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    if (frames) CORE_NEED(rend_stage_frame(s.stage, &s.view, &progress, &err));
+    rgl_record record = rgl_null_record(s.gl);
+    rend_stage_figures(s.stage, &figures);
+    if (!frames) assert_int_equal(record.points_drawn, figures.points_drawn);
+    stop(&s);
+    return record;
+}
+
+static void blending_draws_every_point_twice_and_counts_it_once(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_figures figures;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    rgl_record plain = still(&site, 0, 0, &figures);
+    assert_int_equal(plain.points_again, 0);
+    const uint64_t sizes[] = {0, 40000, 300000}; /* one part, and several */
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        rgl_record r = blended(&site, sizes[i], false);
+        assert_int_equal(r.points_drawn, plain.points_drawn);
+        assert_int_equal(r.points_again, plain.points_drawn);
+        assert_true(r.picture_hash == plain.picture_hash && r.again_hash == plain.picture_hash);
+        assert_int_equal(r.begins, 1);
+        assert_int_equal(r.ends, 1);
+    }
+    rgl_record both = blended(&site, 0, true);
+    assert_int_equal(both.points_drawn, 2 * plain.points_drawn);
+    assert_true(both.again_hash == both.picture_hash);
+    render_site_fini(&site);
+}
+
 /* A cache that cannot hold the view shows what it holds, and comes to rest. */
 static void a_small_gpu_cache_does_not_thrash(void **unused)
 {
@@ -369,6 +410,7 @@ int main(void)
         cmocka_unit_test(a_still_is_the_same_whatever_the_cache_sizes),
         cmocka_unit_test(boxes_side_by_side_show_each_point_once),
         cmocka_unit_test(frames_converge_to_the_still),
+        cmocka_unit_test(blending_draws_every_point_twice_and_counts_it_once),
         cmocka_unit_test(a_small_gpu_cache_does_not_thrash),
         cmocka_unit_test(the_budget_holds_in_frames_and_stills),
         cmocka_unit_test(a_damaged_node_is_counted_once_and_left_out),

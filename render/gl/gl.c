@@ -1,59 +1,51 @@
 /* The OpenGL 3.3 core backend. */
+#include "render/gl/canvas.h"
 #include "render/gl/driver.h"
 #include "render/gl/program.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct {
-    GLuint name;
-    GLint anchor, offset, rotation, inverse_tan, range, splat, grid_bits, clip_low, clip_high;
+    GLuint name; /* 0: not made yet */
+    GLint anchor, offset, rotation, inverse_tan, range, splat, grid_bits, slab, bend;
+    GLint clip_low, clip_high;
 } points_program;
 
-typedef struct {
-    GLuint name;
-    GLint range, edl, top, bottom, height;
-} shade_program;
-
-enum { ROUND = 1, OCTANTS = 2, CLIP = 4, KIND_COUNT = 8 }; /* flags */
-enum { OCTANTS_WIDTH = 1024 };                             /* texels; the shader knows it too */
+/* What a program for points does; flags. */
+enum {
+    ROUND = 1,
+    PARABOLOID = 2,
+    OCTANTS = 4,
+    SMALLEST = 8,
+    BLEND = 16,
+    CLIP = 32,
+    KIND_COUNT = 64
+};
+enum { OCTANTS_WIDTH = 1024 }; /* texels; the shader knows it too */
 
 typedef struct {
     rgl base;
-    GLuint arena, arena_vao, empty_vao;
+    GLuint arena, arena_vao;
     uint64_t arena_size;               /* vertices */
     points_program points[KIND_COUNT]; /* made at first use */
-    shade_program shade;
-    GLuint scene_fbo, colours, depths; /* of scene_width by scene_height; 0: none yet */
-    GLuint picture_fbo, picture;
+    rgl_canvas canvas;
     GLuint octants;
-    uint32_t width, height;
     bool robust; /* the context tells when it is lost */
     char renderer[128];
 } gl_rgl;
 
-static void delete_targets(gl_rgl *g)
-{
-    glDeleteFramebuffers(1, &g->scene_fbo);
-    glDeleteFramebuffers(1, &g->picture_fbo);
-    glDeleteTextures(1, &g->colours);
-    glDeleteTextures(1, &g->depths);
-    glDeleteTextures(1, &g->picture);
-    g->scene_fbo = g->picture_fbo = g->colours = g->depths = g->picture = 0;
-    g->width = g->height = 0;
-}
-
 static void gl_destroy(rgl *gl)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    delete_targets(g);
+    rgl_canvas_fini(&g->canvas);
     glDeleteTextures(1, &g->octants);
     glDeleteBuffers(1, &g->arena);
     glDeleteVertexArrays(1, &g->arena_vao);
-    glDeleteVertexArrays(1, &g->empty_vao);
     for (int k = 0; k < KIND_COUNT; k++)
         glDeleteProgram(g->points[k].name);
-    glDeleteProgram(g->shade.name);
     free(g);
 }
 
@@ -110,97 +102,64 @@ static bool gl_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertice
     return is_healthy(g, "an upload", err);
 }
 
-static GLuint make_texture(GLint format, GLenum layout, GLenum type, uint32_t width,
-                           uint32_t height)
+static bool make_points_program(int kind, points_program *out, mospt_err *err)
 {
-    GLuint texture = 0;
-    GL(glGenTextures(1, &texture));
-    GL(glBindTexture(GL_TEXTURE_2D, texture));
-    GL(glTexImage2D(GL_TEXTURE_2D, 0, format, (GLsizei)width, (GLsizei)height, 0, layout, type,
-                    NULL));
-    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
-    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
-    return texture;
-}
-
-static GLuint make_framebuffer(GLuint colour, GLuint depth)
-{
-    GLuint fbo = 0;
-    GL(glGenFramebuffers(1, &fbo));
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, fbo));
-    GL(glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0));
-    if (depth != 0)
-        GL(glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, depth, 0));
-    return fbo;
-}
-
-static bool fit_targets(gl_rgl *g, uint32_t width, uint32_t height, mospt_err *err)
-{
-    if (g->width == width && g->height == height) return true;
-    GLint max = 0;
-    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max);
-    if (width == 0 || height == 0 || width > (uint32_t)max || height > (uint32_t)max)
-        return mospt_err_set(
-            err, MOSPT_EINVAL, mospt_nowhere(),
-            "a picture of %u x %u pixels is not possible; this driver draws up to %d x %d", width,
-            height, max, max);
-    delete_targets(g);
-    g->colours = make_texture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
-    g->depths = make_texture(GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT, width, height);
-    g->picture = make_texture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, width, height);
-    g->scene_fbo = make_framebuffer(g->colours, g->depths);
-    bool complete = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-    g->picture_fbo = make_framebuffer(g->picture, 0);
-    complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-    if (!is_healthy(g, "the picture", err)) return false;
-    if (!complete)
-        return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
-                             "the graphics driver cannot draw into a picture of %u x %u", width,
-                             height);
-    g->width = width, g->height = height;
-    return true;
-}
-
-static bool use_points_program(gl_rgl *g, int kind, const points_program **out, mospt_err *err)
-{
-    points_program *p = &g->points[kind];
-    if (p->name == 0) {
-        char defines[64] = "";
-        strcat(defines, kind & ROUND ? "#define ROUND\n" : "");
-        strcat(defines, kind & OCTANTS ? "#define OCTANTS\n" : "");
-        strcat(defines, kind & CLIP ? "#define CLIP\n" : "");
-        if (!rgl_program_create(defines, RGL_POINTS_VERTEX, RGL_POINTS_FRAGMENT, &p->name, err))
-            return false;
-        p->anchor = glGetUniformLocation(p->name, "anchor");
-        p->offset = glGetUniformLocation(p->name, "offset");
-        p->rotation = glGetUniformLocation(p->name, "rotation");
-        p->inverse_tan = glGetUniformLocation(p->name, "inverse_tan");
-        p->range = glGetUniformLocation(p->name, "range");
-        p->splat = glGetUniformLocation(p->name, "splat");
-        p->grid_bits = glGetUniformLocation(p->name, "grid_bits");
-        p->clip_low = glGetUniformLocation(p->name, "clip_low");
-        p->clip_high = glGetUniformLocation(p->name, "clip_high");
-    }
+    char defines[200];
+    snprintf(defines, sizeof defines, "#define SQUARE_PX %.1f\n%s%s%s%s%s%s", (double)RGL_SQUARE_PX,
+             kind & (ROUND | PARABOLOID) ? "#define ROUND\n" : "",
+             kind & PARABOLOID ? "#define PARABOLOID\n" : "",
+             kind & OCTANTS ? "#define OCTANTS\n" : "", kind & SMALLEST ? "#define SMALLEST\n" : "",
+             kind & BLEND ? "#define BLEND\n" : "", kind & CLIP ? "#define CLIP\n" : "");
+    points_program p = {0};
+    if (!rgl_program_create(defines, RGL_POINTS_VERTEX, RGL_POINTS_FRAGMENT, &p.name, err))
+        return false;
+    p.anchor = glGetUniformLocation(p.name, "anchor");
+    p.offset = glGetUniformLocation(p.name, "offset");
+    p.rotation = glGetUniformLocation(p.name, "rotation");
+    p.inverse_tan = glGetUniformLocation(p.name, "inverse_tan");
+    p.range = glGetUniformLocation(p.name, "range");
+    p.splat = glGetUniformLocation(p.name, "splat");
+    p.grid_bits = glGetUniformLocation(p.name, "grid_bits");
+    p.slab = glGetUniformLocation(p.name, "slab");
+    p.clip_low = glGetUniformLocation(p.name, "clip_low");
+    p.clip_high = glGetUniformLocation(p.name, "clip_high");
+    p.bend = glGetUniformLocation(p.name, "bend");
+    GL(glUseProgram(p.name));
+    GL(glUniform1i(glGetUniformLocation(p.name, "nearest"), RGL_CANVAS_NEAREST));
     *out = p;
     return true;
+}
+
+static int kind_of(const rgl_scene *scene, const rgl_batch *batch, bool blend)
+{
+    int kind = (blend ? BLEND : 0) | (scene->clip != NULL ? CLIP : 0);
+    /* What is narrower than this is a square. */
+    if (scene->px_max >= RGL_SQUARE_PX && !(batch->smallest && scene->px_min < RGL_SQUARE_PX))
+        kind |= batch->shape == RGL_ROUND ? ROUND : batch->shape == RGL_PARABOLOID ? PARABOLOID : 0;
+    if (batch->smallest) kind |= SMALLEST;
+    else if (scene->octants != NULL) kind |= OCTANTS;
+    return kind;
 }
 
 static void set_scene(const points_program *p, const rgl_scene *scene)
 {
     const rend_frame *f = &scene->frame;
+    float span = log2f(f->far_w / f->near_w);
+    float size = scene->octants != NULL ? scene->splat_scale : scene->splat_size;
     GL(glUseProgram(p->name));
     GL(glUniform3uiv(p->anchor, 1, f->anchor));
     GL(glUniform3fv(p->offset, 1, f->offset));
     GL(glUniformMatrix3fv(p->rotation, 1, GL_FALSE, f->rotation));
     GL(glUniform2f(p->inverse_tan, 1 / f->tan_half[0], 1 / f->tan_half[1]));
-    GL(glUniform2f(p->range, log2f(f->near_w), 1 / log2f(f->far_w / f->near_w)));
+    GL(glUniform2f(p->range, log2f(f->near_w), 1 / span));
     GL(glUniform1i(p->grid_bits, (GLint)scene->grid_bits));
     if (scene->clip != NULL) {
         GL(glUniform3uiv(p->clip_low, 1, scene->clip->low));
         GL(glUniform3uiv(p->clip_high, 1, scene->clip->high));
     }
-    float size = scene->octants != NULL ? scene->splat_scale : scene->splat_size;
     GL(glUniform3f(p->splat, size * f->focal_px, scene->px_min, scene->px_max));
+    GL(glUniform1f(p->slab, rgl_canvas_deeper(scene, scene->blend_slab)));
+    GL(glUniform2f(p->bend, 1 / (2 * f->focal_px), 1 / span));
 }
 
 /* The tree of what is drawn, for the walk in the vertex shader. */
@@ -220,62 +179,51 @@ static void upload_octants(gl_rgl *g, const rgl_scene *scene)
                            GL_UNSIGNED_INT, scene->octants + (size_t)rows * OCTANTS_WIDTH));
 }
 
+/* The size of a point is the program's business, unless all are alike. */
+static void set_point_size(const rgl_scene *scene, const rgl_batch *batch)
+{
+    if (batch->smallest) {
+        GL(glDisable(GL_PROGRAM_POINT_SIZE));
+        GL(glPointSize(scene->px_min));
+    } else {
+        GL(glEnable(GL_PROGRAM_POINT_SIZE));
+    }
+}
+
 static bool draw_points(gl_rgl *g, const rgl_scene *scene, const rgl_batch *batches,
-                        uint32_t batch_count, mospt_err *err)
+                        uint32_t batch_count, bool blend, mospt_err *err)
 {
     GL(glBindVertexArray(g->arena_vao));
     GL(glActiveTexture(GL_TEXTURE0));
     GL(glBindTexture(GL_TEXTURE_2D, g->octants));
     for (uint32_t b = 0; b < batch_count; b++) {
-        const points_program *p = NULL;
-        int kind = (batches[b].round ? ROUND : 0) | (scene->octants != NULL ? OCTANTS : 0) |
-                   (scene->clip != NULL ? CLIP : 0);
+        points_program *p = &g->points[kind_of(scene, &batches[b], blend)];
         if (batches[b].range_count == 0) continue;
-        if (!use_points_program(g, kind, &p, err)) return false;
+        if (p->name == 0 && !make_points_program((int)(p - g->points), p, err)) return false;
         set_scene(p, scene);
+        set_point_size(scene, &batches[b]);
         GL(glMultiDrawArrays(GL_POINTS, batches[b].first, batches[b].count,
                              (GLsizei)batches[b].range_count));
     }
     return true;
 }
 
-static void shade(gl_rgl *g, const rgl_scene *scene, GLuint target)
-{
-    const rend_frame *f = &scene->frame;
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, target));
-    GL(glDisable(GL_DEPTH_TEST));
-    GL(glUseProgram(g->shade.name));
-    GL(glActiveTexture(GL_TEXTURE1));
-    GL(glBindTexture(GL_TEXTURE_2D, g->depths));
-    GL(glActiveTexture(GL_TEXTURE0));
-    GL(glBindTexture(GL_TEXTURE_2D, g->colours));
-    GL(glUniform2f(g->shade.range, log2f(f->near_w), log2f(f->far_w / f->near_w)));
-    GL(glUniform2f(g->shade.edl, scene->edl_strength, scene->edl_radius_px));
-    GL(glUniform3fv(g->shade.top, 1, scene->background_top));
-    GL(glUniform3fv(g->shade.bottom, 1, scene->background_bottom));
-    GL(glUniform1f(g->shade.height, (float)f->height));
-    GL(glBindVertexArray(g->empty_vao));
-    GL(glDrawArrays(GL_TRIANGLES, 0, 3));
-}
-
 static bool gl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
                     int parts, mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    if (!fit_targets(g, scene->frame.width, scene->frame.height, err)) return false;
-    GL(glViewport(0, 0, (GLsizei)g->width, (GLsizei)g->height));
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->scene_fbo));
-    GL(glEnable(GL_DEPTH_TEST));
-    GL(glDepthFunc(GL_LESS));
-    GL(glDisable(GL_BLEND));
-    if (parts & RGL_BEGIN) {
-        GL(glClearColor(0, 0, 0, 1));
-        GL(glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT));
-        if (scene->octants != NULL) upload_octants(g, scene);
+    bool begin = (parts & RGL_BEGIN) != 0, again = (parts & RGL_AGAIN) != 0;
+    if (!rgl_canvas_fit(&g->canvas, scene, err)) return false;
+    if (begin || !again) {
+        rgl_canvas_draw(&g->canvas, begin);
+        if (begin && scene->octants != NULL) upload_octants(g, scene);
+        if (!draw_points(g, scene, batches, batch_count, false, err)) return false;
     }
-    GL(glEnable(GL_PROGRAM_POINT_SIZE));
-    if (!draw_points(g, scene, batches, batch_count, err)) return false;
-    if (parts & RGL_END) shade(g, scene, parts & RGL_TO_WINDOW ? 0 : g->picture_fbo);
+    if (again && (!rgl_canvas_add(&g->canvas, err) ||
+                  !draw_points(g, scene, batches, batch_count, true, err)))
+        return false;
+    if (parts & RGL_END && !rgl_canvas_finish(&g->canvas, scene, (parts & RGL_TO_WINDOW) != 0, err))
+        return false;
     return is_healthy(g, "a frame", err);
 }
 
@@ -296,7 +244,7 @@ static bool gl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t h
                            mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, from_window ? 0 : g->picture_fbo));
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, from_window ? 0 : g->canvas.picture.fbo));
     GL(glReadBuffer(from_window ? GL_BACK : GL_COLOR_ATTACHMENT0));
     GL(glPixelStorei(GL_PACK_ALIGNMENT, 1));
     GL(glReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RGB, GL_UNSIGNED_BYTE, rgb));
@@ -310,25 +258,26 @@ static bool gl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_e
     int side = 2 * radius + 1;
     for (int i = 0; i < side * side; i++)
         out[i] = 1;
-    if (g->scene_fbo == 0) return true;
+    if (g->canvas.points.fbo == 0) return true;
+    int width = (int)g->canvas.width, height = (int)g->canvas.height;
     int left = x - radius < 0 ? 0 : x - radius, top = y - radius < 0 ? 0 : y - radius;
-    int right = x + radius < (int)g->width ? x + radius : (int)g->width - 1;
-    int low = y + radius < (int)g->height ? y + radius : (int)g->height - 1;
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->scene_fbo));
+    int right = x + radius < width ? x + radius : width - 1;
+    int low = y + radius < height ? y + radius : height - 1;
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->canvas.points.fbo));
     for (int row = top; row <= low && left <= right; row++)
-        GL(glReadPixels(left, (GLint)g->height - 1 - row, right - left + 1, 1, GL_DEPTH_COMPONENT,
-                        GL_FLOAT, out + (row - (y - radius)) * side + (left - (x - radius))));
+        GL(glReadPixels(left, height - 1 - row, right - left + 1, 1, GL_DEPTH_COMPONENT, GL_FLOAT,
+                        out + (row - (y - radius)) * side + (left - (x - radius))));
     return is_healthy(g, "reading depths", err);
 }
 
 static bool gl_read_depths(rgl *gl, float *out, mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->scene_fbo));
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, g->canvas.points.fbo));
     GL(glPixelStorei(GL_PACK_ALIGNMENT, 4));
-    GL(glReadPixels(0, 0, (GLsizei)g->width, (GLsizei)g->height, GL_DEPTH_COMPONENT, GL_FLOAT,
-                    out));
-    flip_rows(out, g->width * sizeof *out, g->height);
+    GL(glReadPixels(0, 0, (GLsizei)g->canvas.width, (GLsizei)g->canvas.height, GL_DEPTH_COMPONENT,
+                    GL_FLOAT, out));
+    flip_rows(out, g->canvas.width * sizeof *out, g->canvas.height);
     return is_healthy(g, "reading depths", err);
 }
 
@@ -343,19 +292,14 @@ static const rgl_driver GL_DRIVER = {
     .read_depths = gl_read_depths,
 };
 
-static bool make_shade_program(gl_rgl *g, mospt_err *err)
+static GLuint make_octants_texture(void)
 {
-    shade_program *s = &g->shade;
-    if (!rgl_program_create("", RGL_SCREEN_VERTEX, RGL_SHADE_FRAGMENT, &s->name, err)) return false;
-    s->range = glGetUniformLocation(s->name, "range");
-    s->edl = glGetUniformLocation(s->name, "edl");
-    s->top = glGetUniformLocation(s->name, "top");
-    s->bottom = glGetUniformLocation(s->name, "bottom");
-    s->height = glGetUniformLocation(s->name, "height");
-    GL(glUseProgram(s->name));
-    GL(glUniform1i(glGetUniformLocation(s->name, "colours"), 0));
-    GL(glUniform1i(glGetUniformLocation(s->name, "depths"), 1));
-    return true;
+    GLuint texture = 0;
+    GL(glGenTextures(1, &texture));
+    GL(glBindTexture(GL_TEXTURE_2D, texture));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
+    return texture;
 }
 
 bool rgl_gl_create(rgl **out, mospt_err *err)
@@ -377,13 +321,9 @@ bool rgl_gl_create(rgl **out, mospt_err *err)
     while (glGetError() != GL_NO_ERROR) {
     }
     glGenVertexArrays(1, &g->arena_vao);
-    glGenVertexArrays(1, &g->empty_vao);
     glGenBuffers(1, &g->arena);
-    g->octants = make_texture(GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, 1, 1);
-    if (!make_shade_program(g, err)) {
-        gl_destroy(&g->base);
-        return false;
-    }
+    g->octants = make_octants_texture();
+    rgl_canvas_init(&g->canvas);
     *out = &g->base;
     return true;
 }

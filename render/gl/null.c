@@ -53,8 +53,8 @@ static uint64_t link_vertex(uint64_t before, const rgl_batch *batch, const mospt
     struct {
         uint64_t before;
         mospt_vertex vertex;
-        uint64_t round;
-    } link = {before, *vertex, batch->round};
+        uint64_t shape;
+    } link = {before, *vertex, (uint64_t)batch->shape};
     return mospt_hash(&link, sizeof link);
 }
 
@@ -74,19 +74,25 @@ static bool is_inside(const rend_clip *clip, const mospt_vertex *v)
     return inside;
 }
 
-static void record_batch(null_rgl *n, const rend_clip *clip, const rgl_batch *batch)
+static void record_vertex_again(null_rgl *n, const rgl_batch *batch, const mospt_vertex *vertex)
 {
-    n->record.batches++;
+    n->record.again_hash = link_vertex(n->record.again_hash, batch, vertex);
+    n->record.points_again++;
+}
+
+typedef void recorder(null_rgl *n, const rgl_batch *batch, const mospt_vertex *vertex);
+
+static void record_batch(null_rgl *n, const rend_clip *clip, const rgl_batch *batch,
+                         recorder *record)
+{
     for (uint32_t r = 0; r < batch->range_count; r++) {
         uint64_t first = (uint64_t)batch->first[r], count = (uint64_t)batch->count[r];
-        n->record.ranges++;
         if (batch->first[r] < 0 || batch->count[r] < 0 || first + count > n->size) {
             n->record.overruns++;
             continue;
         }
         for (uint64_t v = 0; v < count; v++)
-            if (is_inside(clip, &n->arena[first + v]))
-                record_vertex(n, batch, &n->arena[first + v]);
+            if (is_inside(clip, &n->arena[first + v])) record(n, batch, &n->arena[first + v]);
     }
 }
 
@@ -98,13 +104,18 @@ static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
     if (parts & RGL_BEGIN) {
         size_t size = 8 * sizeof *scene->octants * scene->octant_nodes;
         n->record.octants_hash = scene->octants != NULL ? mospt_hash(scene->octants, size) : 0;
-        n->record.picture_hash = 0;
+        n->record.picture_hash = n->record.again_hash = 0;
         n->record.begins++;
         n->pixels = (uint64_t)scene->frame.width * scene->frame.height;
     }
     n->record.ends += (parts & RGL_END) != 0;
-    for (uint32_t b = 0; b < batch_count; b++)
-        record_batch(n, scene->clip, &batches[b]);
+    for (uint32_t b = 0; b < batch_count; b++) {
+        if (parts & RGL_AGAIN) record_batch(n, scene->clip, &batches[b], record_vertex_again);
+        if (parts & RGL_AGAIN && !(parts & RGL_BEGIN)) continue;
+        n->record.batches++;
+        n->record.ranges += batches[b].range_count;
+        record_batch(n, scene->clip, &batches[b], record_vertex);
+    }
     return true;
 }
 

@@ -2,7 +2,8 @@
 
 /* Position: grid integers minus the anchor as integers, the sign by comparison so that all 32 bits
  * count, and only then floats. Depth: logarithmic in w, which is exact for a splat that faces the
- * eye (render/camera.h). */
+ * eye (render/camera.h). When blending, a splat is drawn nearer by the slab, so that the depth test
+ * lets pass what is averaged. */
 const char RGL_POINTS_VERTEX[] =
     "layout(location = 0) in uvec3 position;\n"
     "layout(location = 1) in vec4 colour;\n" /* r, g, b; intensity, which is not drawn */
@@ -13,7 +14,9 @@ const char RGL_POINTS_VERTEX[] =
     "uniform vec2 range;\n" /* log2 of near, 1 / log2(far / near) */
     "uniform vec3 splat;\n" /* pixels at a distance of one step (of a cell of one step), least and
                                largest on screen */
-    "flat out vec3 tint;\n"
+    "uniform float slab;\n"
+    "flat out vec4 tint;\n" /* colour, width in pixels */
+    "flat out float depth;\n"
     "#ifdef OCTANTS\n"
     "uniform usampler2D octants;\n"
     "uniform int grid_bits;\n"
@@ -44,77 +47,70 @@ const char RGL_POINTS_VERTEX[] =
     "                     ahead.z ? position.z - anchor.z : anchor.z - position.z);\n"
     "    vec3 eye = rotation * (mix(-away, away, ahead) + offset);\n"
     "    float w = -eye.z;\n"
-    "    float depth = (log2(max(w, 1e-30)) - range.x) * range.y;\n"
-    "    gl_Position = vec4(eye.xy * inverse_tan, (2.0 * depth - 1.0) * w, w);\n"
-    "    gl_PointSize = clamp(splat.x * cell_at(position) / max(w, 1e-30), splat.y, splat.z);\n"
-    "    tint = colour.rgb;\n"
+    "    depth = (log2(max(w, 1e-30)) - range.x) * range.y;\n"
+    "#ifdef BLEND\n"
+    "    float drawn = depth < 0.0 ? depth : max(depth - slab, 0.0);\n"
+    "#else\n"
+    "    float drawn = depth;\n"
+    "#endif\n"
+    "    gl_Position = vec4(eye.xy * inverse_tan, (2.0 * drawn - 1.0) * w, w);\n"
+    "#ifdef SMALLEST\n"
+    "    float size = splat.y;\n"
+    "#else\n"
+    "    float size = clamp(splat.x * cell_at(position) / max(w, 1e-30), splat.y, splat.z);\n"
+    "    gl_PointSize = size;\n"
+    "#endif\n"
+    "    tint = vec4(colour.rgb, size);\n"
     "#ifdef CLIP\n" /* beyond the far plane there is nothing */
     "    if (any(lessThan(position, clip_low)) || any(greaterThan(position, clip_high)))\n"
     "        gl_Position = vec4(0.0, 0.0, 2.0, 1.0);\n"
     "#endif\n"
     "}\n";
 
-const char RGL_POINTS_FRAGMENT[] = "flat in vec3 tint;\n"
-                                   "out vec4 result;\n"
-                                   "void main()\n"
-                                   "{\n"
-                                   "#ifdef ROUND\n"
-                                   "    vec2 p = 2.0 * gl_PointCoord - 1.0;\n"
-                                   "    if (dot(p, p) > 1.0) discard;\n"
-                                   "#endif\n"
-                                   "    result = vec4(tint, 1.0);\n"
-                                   "}\n";
-
-/* One triangle that covers the screen, made of nothing. */
-const char RGL_SCREEN_VERTEX[] = "void main()\n"
-                                 "{\n"
-                                 "    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, "
-                                 "gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n"
-                                 "}\n";
-
-/* Eye-dome lighting (Boucheny 2009): a pixel is darkened by how much nearer its neighbours are, in
- * log2 of the distance, so that the same shape looks the same at every range. Opposite neighbours
- * are taken together, which cancels the slope of a surface seen at a grazing angle: ground that
- * runs to the horizon stays bright, edges and creases do not. */
-const char RGL_SHADE_FRAGMENT[] =
-    "uniform sampler2D colours;\n"
-    "uniform sampler2D depths;\n"
-    "uniform vec2 range;\n" /* log2 of near, log2(far / near) */
-    "uniform vec2 edl;\n"   /* strength, radius in pixels */
-    "uniform vec3 top, bottom;\n"
-    "uniform float height;\n"
+/* Sections 1 and 2 of rgl.h. */
+const char RGL_POINTS_FRAGMENT[] =
+    "#ifdef GL_ARB_conservative_depth\n"
+    "#extension GL_ARB_conservative_depth : enable\n"
+    "#endif\n"
+    "flat in vec4 tint;\n"
+    "flat in float depth;\n"
+    "#ifdef BLEND\n"
+    "uniform sampler2D nearest;\n"
+    "uniform float slab;\n"
+    "layout(location = 0) out vec4 sum;\n"
+    "layout(location = 1) out float depth_sum;\n"
+    "#else\n"
     "out vec4 result;\n"
-    "float depth_at(ivec2 p)\n"
+    "#endif\n"
+    "#ifdef PARABOLOID\n"
+    "uniform vec2 bend;\n" /* 1 / (2 focal_px), 1 / span */
+    "#ifdef GL_ARB_conservative_depth\n"
+    "layout(depth_greater) out float gl_FragDepth;\n"
+    "#endif\n"
+    "#endif\n"
+    "float r2()\n"
     "{\n"
-    "    return texelFetch(depths, clamp(p, ivec2(0), textureSize(depths, 0) - 1), 0).r;\n"
-    "}\n"
-    "float nearer(float here, ivec2 p, ivec2 step)\n"
-    "{\n"
-    "    float a = depth_at(p + step), b = depth_at(p - step);\n"
-    /* The sky is no neighbour: an edge against it would say nothing about shape. */
-    "    float da = a < 1.0 ? (here - a) * range.y : 0.0, db = b < 1.0 ? (here - b) * range.y : "
-    "0.0;\n"
-    "    float bend = max(da + db, 0.0), slope = max(da, 0.0) + max(db, 0.0);\n"
-    "    float sum = mix(bend, slope, 0.25);\n"
-    "    return sum / (1.0 + 60.0 * sum);\n" /* an edge is an edge, however far behind it the next
-                                                surface stands */
+    "    vec2 p = 2.0 * gl_PointCoord - 1.0;\n"
+    "    return tint.a < SQUARE_PX ? 0.0 : dot(p, p);\n"
     "}\n"
     "void main()\n"
     "{\n"
-    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
-    "    float here = depth_at(p);\n"
-    "    if (here >= 1.0) {\n"
-    "        result = vec4(mix(bottom, top, gl_FragCoord.y / height), 1.0);\n"
-    "        return;\n"
-    "    }\n"
-    "    vec3 colour = texelFetch(colours, p, 0).rgb;\n"
-    "    if (edl.x > 0.0) {\n"
-    "        int r = int(edl.y + 0.5), q = int(0.7071 * edl.y + 0.5);\n"
-    "        float sum = nearer(here, p, ivec2(r, 0)) + nearer(here, p, ivec2(0, r)) +\n"
-    "                    nearer(here, p, ivec2(q, q)) + nearer(here, p, ivec2(q, -q));\n"
-    "        colour *= exp(-edl.x * sum);\n"
-    "    }\n"
-    "    result = vec4(colour, 1.0);\n"
+    "#ifdef ROUND\n"
+    "    if (r2() > 1.0) discard;\n"
+    "#endif\n"
+    "#ifdef PARABOLOID\n"
+    "    float deeper = log2(1.0 + r2() * tint.a * bend.x) * bend.y;\n"
+    "    gl_FragDepth = min(gl_FragCoord.z + deeper, 0.99999994);\n"
+    "#endif\n"
+    "#ifdef BLEND\n"
+    "    float front = texelFetch(nearest, ivec2(gl_FragCoord.xy), 0).r;\n"
+    "    float behind = clamp((depth - front) / slab, -1.0, 1.0);\n"
+    "    float weight = max(1.0, floor(8.5 - 8.0 * r2()));\n"
+    "    sum = weight * vec4(floor(255.0 * tint.rgb + 0.5), 1.0);\n"
+    "    depth_sum = weight * floor(255.0 * behind + 0.5);\n"
+    "#else\n"
+    "    result = vec4(tint.rgb, 1.0);\n"
+    "#endif\n"
     "}\n";
 
 const char RGL_TEXT_VERTEX[] =
