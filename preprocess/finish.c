@@ -54,7 +54,7 @@ size_t prep_finish_size(size_t record_size, uint64_t count)
 
 size_t prep_finish_emit_size(size_t record_size, uint64_t count)
 {
-    return (size_t)count * (record_size + sizeof(uint32_t)) +
+    return (size_t)count * (2 * record_size + sizeof(uint32_t)) +
            mospt_linear_work_size((uint32_t)count);
 }
 

@@ -440,16 +440,41 @@ bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t
     return true;
 }
 
-/* The payload, which may end anywhere, the order, and what the linearisation needs. */
-static size_t payload_room(const prep_shape *shape, uint32_t count)
+/* Records that are fetched before their turn, since they stand anywhere. */
+enum { AHEAD = 24 };
+
+static size_t records_room(const prep_shape *shape, uint32_t count)
 {
     return (count * mospt_record_size(shape->schema) + sizeof(uint64_t) - 1) / sizeof(uint64_t) *
            sizeof(uint64_t);
 }
 
+/* The payload and the records, which may end anywhere, the order, and what the linearisation needs.
+ */
 size_t prep_solve_emit_size(const prep_shape *shape, uint32_t count)
 {
-    return payload_room(shape, count) + count * sizeof(uint32_t) + mospt_linear_work_size(count);
+    return 2 * records_room(shape, count) + count * sizeof(uint32_t) +
+           mospt_linear_work_size(count);
+}
+
+/* Copies the records of a node to one place, in the order of its keys, which then have their indices
+ * there. It is the only time that they are fetched from all over the memory: what follows finds
+ * them side by side. */
+static void gather_records(const mospt_records *records, uint64_t *keys, uint32_t count,
+                           uint32_t index_bits, uint8_t *to)
+{
+    uint64_t index_mask = (UINT64_C(1) << index_bits) - 1;
+    for (uint32_t i = 0; i < count; i++, to += records->stride) {
+        if (i + AHEAD < count) {
+            const uint8_t *later =
+                mospt_records_at(records, mospt_linear_index(keys[i + AHEAD], index_bits));
+            __builtin_prefetch(later);
+            __builtin_prefetch(later + records->stride - 1);
+        }
+        mospt_record_copy(to, mospt_records_at(records, mospt_linear_index(keys[i], index_bits)),
+                          records->stride);
+        keys[i] = (keys[i] & ~index_mask) | i;
+    }
 }
 
 uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
@@ -459,13 +484,18 @@ uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
     mospt_node *node = &solved->node;
     uint32_t count = node->count;
     uint8_t *payload = memory;
-    uint32_t *order = (uint32_t *)(payload + payload_room(shape, count));
-    mospt_linear_input input = {.records = records,
+    const uint8_t *gathered = payload + records_room(shape, count);
+    uint32_t *order = (uint32_t *)(payload + 2 * records_room(shape, count));
+    mospt_records own = {
+        .blocks = &gathered, .stride = records->stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
+    mospt_linear_input input = {.records = &own,
                                 .depth = shape->inner_depth,
                                 .index_bits = subtree->index_bits,
                                 .cell_shift = solved->cell_shift};
+    gather_records(records, solved->keys, count, subtree->index_bits,
+                   payload + records_room(shape, count));
     mospt_linear_build(&input, solved->keys, count, order + count, order, node->level_end);
-    mospt_payload_pack(shape->schema, records, order, count, payload, node);
+    mospt_payload_pack(shape->schema, &own, order, count, payload, node);
     return mospt_payload_points_hash(shape->schema, payload, payload + count * sizeof(mospt_vertex),
                                      count);
 }
