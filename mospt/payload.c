@@ -56,12 +56,36 @@ static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_
 #undef COPY
 }
 
-void mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
-                        const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node)
+/* Of points [start, start + n) of a payload; at most BLOCK. */
+static uint64_t hash_block(const mospt_schema *schema, const uint8_t *vertices,
+                           const uint8_t *planes, uint32_t count, uint32_t start, uint32_t n)
+{
+    uint8_t records[2 * MOSPT_ROW_SIZE_MAX];
+    size_t stride = mospt_record_size(schema);
+    uint32_t room = (uint32_t)(sizeof records / stride), end = start + n;
+    uint64_t sum = 0;
+    for (; start < end; start += n) {
+        n = end - start < room ? end - start : room;
+        copy_strided(records, stride, vertices + start * sizeof(mospt_vertex), sizeof(mospt_vertex),
+                     sizeof(mospt_vertex), n);
+        for (uint32_t k = 0; k < schema->count; k++) {
+            const mospt_attribute *a = &schema->at[k];
+            size_t size = mospt_attribute_size(a);
+            copy_strided(records + sizeof(mospt_vertex) + a->offset, stride,
+                         planes + (size_t)count * a->offset + start * size, size, size, n);
+        }
+        sum += mospt_hash_records(records, stride, n);
+    }
+    return sum;
+}
+
+uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
+                            const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node)
 {
     size_t vertices_size = (size_t)count * sizeof(mospt_vertex);
     uint8_t *planes = out + vertices_size;
     const uint8_t *from[BLOCK];
+    uint64_t points_hash = 0;
     for (uint32_t start = 0; start < count; start += BLOCK) {
         uint32_t n = count - start < BLOCK ? count - start : BLOCK;
         for (uint32_t i = 0; i < n; i++) {
@@ -76,32 +100,23 @@ void mospt_payload_pack(const mospt_schema *schema, const mospt_records *records
             gather(planes + (size_t)count * a->offset + start * size, from,
                    sizeof(mospt_vertex) + a->offset, size, n);
         }
+        /* Of what stands in the payload, while it is in the first cache. */
+        points_hash += hash_block(schema, out, planes, count, start, n);
     }
     node->count = count;
     node->codec = MOSPT_CODEC_RAW;
     node->payload_size = (uint64_t)count * mospt_record_size(schema);
     node->vertices_hash = mospt_hash(out, vertices_size);
     node->attributes_hash = mospt_hash(planes, (size_t)count * schema->row_size);
+    return points_hash;
 }
 
 uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices,
                                    const uint8_t *planes, uint32_t count)
 {
-    uint8_t records[2 * MOSPT_ROW_SIZE_MAX];
-    size_t stride = mospt_record_size(schema);
-    uint32_t room = (uint32_t)(sizeof records / stride);
     uint64_t sum = 0;
-    for (uint32_t start = 0, n; start < count; start += n) {
-        n = count - start < room ? count - start : room;
-        copy_strided(records, stride, vertices + start * sizeof(mospt_vertex), sizeof(mospt_vertex),
-                     sizeof(mospt_vertex), n);
-        for (uint32_t k = 0; k < schema->count; k++) {
-            const mospt_attribute *a = &schema->at[k];
-            size_t size = mospt_attribute_size(a);
-            copy_strided(records + sizeof(mospt_vertex) + a->offset, stride,
-                         planes + (size_t)count * a->offset + start * size, size, size, n);
-        }
-        sum += mospt_hash_records(records, stride, n);
-    }
+    for (uint32_t start = 0; start < count; start += BLOCK)
+        sum += hash_block(schema, vertices, planes, count, start,
+                          count - start < BLOCK ? count - start : BLOCK);
     return sum;
 }

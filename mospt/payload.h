@@ -14,9 +14,10 @@ static inline size_t mospt_record_size(const mospt_schema *schema)
 /* Packs the records order[0..count-1] of `records` into `out`, and sets the size and the hashes of
  * `node`.
  * records  vertex and row of each point, mospt_record_size() bytes
- * out      [count * mospt_record_size()] */
-void mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
-                        const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node);
+ * out      [count * mospt_record_size()]
+ * returns  mospt_payload_points_hash() of what it has written */
+uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
+                            const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node);
 
 /* Sum of the hashes of the points in a payload, each as mospt_hash_records() sees its record.
  * vertices [count], planes [count * row_size] bytes as they are stored */

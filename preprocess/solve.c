@@ -457,9 +457,9 @@ size_t prep_solve_emit_size(const prep_shape *shape, uint32_t count)
            mospt_linear_work_size(count);
 }
 
-/* Copies the records of a node to one place, in the order of its keys, which then have their indices
- * there. It is the only time that they are fetched from all over the memory: what follows finds
- * them side by side. */
+/* Copies the records of a node to one place, in the order of its keys, which then have their
+ * indices there. It is the only time that they are fetched from all over the memory: what follows
+ * finds them side by side. */
 static void gather_records(const mospt_records *records, uint64_t *keys, uint32_t count,
                            uint32_t index_bits, uint8_t *to)
 {
@@ -495,7 +495,5 @@ uint64_t prep_solve_emit(const prep_shape *shape, const mospt_records *records,
     gather_records(records, solved->keys, count, subtree->index_bits,
                    payload + records_room(shape, count));
     mospt_linear_build(&input, solved->keys, count, order + count, order, node->level_end);
-    mospt_payload_pack(shape->schema, &own, order, count, payload, node);
-    return mospt_payload_points_hash(shape->schema, payload, payload + count * sizeof(mospt_vertex),
-                                     count);
+    return mospt_payload_pack(shape->schema, &own, order, count, payload, node);
 }
