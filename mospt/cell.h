@@ -67,16 +67,17 @@ static inline uint64_t mospt_cell_code(uint32_t x, uint32_t y, uint32_t z, uint3
     return mospt_morton_spread(lx) | mospt_morton_spread(ly) << 1 | mospt_morton_spread(lz) << 2;
 }
 
-/* The same for at most 10 levels. */
-static inline uint32_t mospt_cell_code_short(uint32_t x, uint32_t y, uint32_t z, uint32_t cell_bits,
-                                             uint32_t depth)
-{
-    uint32_t drop = cell_bits > depth ? cell_bits - depth : 0,
-             pad = depth > cell_bits ? depth - cell_bits : 0, mask = (1u << depth) - 1;
-    return mospt_morton_spread_short((x >> drop << pad) & mask) |
-           mospt_morton_spread_short((y >> drop << pad) & mask) << 1 |
-           mospt_morton_spread_short((z >> drop << pad) & mask) << 2;
-}
+/* Coordinates of some points, axis by axis. */
+enum { MOSPT_CELL_POINTS_MAX = 128 };
+typedef struct {
+    uint32_t x[MOSPT_CELL_POINTS_MAX], y[MOSPT_CELL_POINTS_MAX], z[MOSPT_CELL_POINTS_MAX];
+} mospt_cell_points;
+
+/* Codes of `count` points, as mospt_cell_code() makes them; short ones of at most 10 levels. */
+void mospt_cell_codes(const mospt_cell_points *restrict points, uint32_t count, uint32_t cell_bits,
+                      uint32_t depth, uint64_t *restrict codes);
+void mospt_cell_codes_short(const mospt_cell_points *restrict points, uint32_t count,
+                            uint32_t cell_bits, uint32_t depth, uint32_t *restrict codes);
 
 /* True if a point lies in the node at `level` whose low corner is `corner`. */
 static inline bool mospt_cell_contains(const mospt_grid *grid, const uint32_t corner[3],

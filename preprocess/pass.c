@@ -165,6 +165,20 @@ static uint16_t *begin_of(const prep_pass *p, const batch *b, uint32_t slice)
     return b->begin + (size_t)slice * (p->bucket_count + 1);
 }
 
+static void find_codes(const uint8_t *records, size_t stride, uint32_t count, uint32_t cell_bits,
+                       uint32_t levels, uint32_t *codes)
+{
+    mospt_cell_points points;
+    for (uint32_t begin = 0, n; begin < count; begin += n) {
+        n = count - begin < MOSPT_CELL_POINTS_MAX ? count - begin : MOSPT_CELL_POINTS_MAX;
+        for (uint32_t i = 0; i < n; i++, records += stride) {
+            mospt_vertex v = mospt_vertex_of(records);
+            points.x[i] = v.x, points.y[i] = v.y, points.z[i] = v.z;
+        }
+        mospt_cell_codes_short(&points, n, cell_bits, levels, codes + begin);
+    }
+}
+
 /* Job: a slice of the batch being prepared, and the order of its records by bucket (a stable
  * counting sort). */
 static void prepare_slice(prep_pass *p, uint32_t slice)
@@ -175,15 +189,12 @@ static void prepare_slice(prep_pass *p, uint32_t slice)
     uint16_t *order = b->order + (size_t)slice * PREP_PASS_SLICE, *begin = begin_of(p, b, slice);
     uint32_t bits = mospt_cell_bits(p->env->shape->grid, p->level), levels = p->code_levels;
     uint32_t bucket_shift = 3 * (levels - p->levels);
-    size_t stride = p->stride;
     uint32_t count = p->prepare(p->context, slice, records);
 
+    find_codes(records, p->stride, count, bits, levels, codes);
     memset(begin, 0, (p->bucket_count + 1) * sizeof *begin);
-    for (uint32_t i = 0; i < count; i++) {
-        mospt_vertex v = mospt_vertex_of(records + i * stride);
-        codes[i] = mospt_cell_code_short(v.x, v.y, v.z, bits, levels);
+    for (uint32_t i = 0; i < count; i++)
         begin[codes[i] >> bucket_shift]++;
-    }
     for (uint32_t k = 0, sum = 0; k <= p->bucket_count; k++) {
         uint32_t n = begin[k];
         begin[k] = (uint16_t)sum;

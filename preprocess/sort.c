@@ -144,14 +144,22 @@ static void find_indices(uint64_t *keys, uint32_t first, uint32_t count)
 /* Gives keys the cells of the levels below `level`. */
 static void find_cells(const prep_sorter *s, uint32_t level, uint64_t *keys, uint32_t count)
 {
-    uint32_t bits = mospt_cell_bits(s->grid, level);
-    for (uint32_t i = 0; i < count; i++) {
-        uint32_t index = mospt_linear_index(keys[i], s->index_bits);
-        if (i + AHEAD < count)
-            __builtin_prefetch(
-                mospt_records_at(s->records, mospt_linear_index(keys[i + AHEAD], s->index_bits)));
-        mospt_vertex v = mospt_vertex_of(mospt_records_at(s->records, index));
-        keys[i] = mospt_cell_code(v.x, v.y, v.z, bits, s->code_levels) << s->index_bits | index;
+    uint32_t bits = mospt_cell_bits(s->grid, level), index_bits = s->index_bits;
+    mospt_cell_points points;
+    uint64_t codes[MOSPT_CELL_POINTS_MAX];
+    for (uint32_t begin = 0, n; begin < count; begin += n, keys += n) {
+        n = count - begin < MOSPT_CELL_POINTS_MAX ? count - begin : MOSPT_CELL_POINTS_MAX;
+        for (uint32_t i = 0; i < n; i++) {
+            if (begin + i + AHEAD < count)
+                __builtin_prefetch(
+                    mospt_records_at(s->records, mospt_linear_index(keys[i + AHEAD], index_bits)));
+            mospt_vertex v = mospt_vertex_of(
+                mospt_records_at(s->records, mospt_linear_index(keys[i], index_bits)));
+            points.x[i] = v.x, points.y[i] = v.y, points.z[i] = v.z;
+        }
+        mospt_cell_codes(&points, n, bits, s->code_levels, codes);
+        for (uint32_t i = 0; i < n; i++)
+            keys[i] = codes[i] << index_bits | mospt_linear_index(keys[i], index_bits);
     }
 }
 
