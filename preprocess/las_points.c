@@ -193,28 +193,43 @@ static void decode_xyz(const prep_las_layout *l, const uint8_t *p, uint32_t coun
     }
 }
 
+static uint8_t intensity_of(const prep_las_layout *l, const uint8_t *record)
+{
+    return l->has_intensity ? prep_tone_apply(&l->tone, prep_le16(record + 12)) : 255;
+}
+
 static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
                            size_t out_stride)
 {
-    prep_tone tone = l->tone;
     size_t stride = l->record_length;
     for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride)
-        memset(out, l->has_intensity ? prep_tone_apply(&tone, prep_le16(p + 12)) : 255, 4);
+        memset(out, intensity_of(l, p), 4);
 }
 
-static void show_rgb(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
-                     size_t out_stride)
+static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
+                        size_t out_stride)
 {
-    prep_tone tone = l->tone;
     size_t stride = l->record_length, at = l->rgb_at;
-    bool is_16 = l->rgb_is_16, has_intensity = l->has_intensity;
     for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
-        uint8_t rgbi[4];
-        for (int c = 0; c < 3; c++) {
-            uint16_t v = prep_le16(p + at + 2 * c);
-            rgbi[c] = is_16 ? prep_tone_from_16(v) : v < 255 ? (uint8_t)v : 255;
-        }
-        rgbi[3] = has_intensity ? prep_tone_apply(&tone, prep_le16(p + 12)) : 255;
+        uint8_t rgbi[4] = {prep_tone_from_16(prep_le16(p + at)),
+                           prep_tone_from_16(prep_le16(p + at + 2)),
+                           prep_tone_from_16(prep_le16(p + at + 4)), intensity_of(l, p)};
+        memcpy(out, rgbi, sizeof rgbi);
+    }
+}
+
+static uint8_t at_most_255(uint16_t v)
+{
+    return v < 255 ? (uint8_t)v : 255;
+}
+
+static void show_rgb_8(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
+                       size_t out_stride)
+{
+    size_t stride = l->record_length, at = l->rgb_at;
+    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
+        uint8_t rgbi[4] = {at_most_255(prep_le16(p + at)), at_most_255(prep_le16(p + at + 2)),
+                           at_most_255(prep_le16(p + at + 4)), intensity_of(l, p)};
         memcpy(out, rgbi, sizeof rgbi);
     }
 }
@@ -345,7 +360,8 @@ static void unpack_block(const prep_las_layout *l, const uint8_t *records, uint3
     uint8_t *rgbi = to->rgbi + begin * to->rgbi_stride;
     records += begin * (size_t)l->record_length;
     if (to->xyz != NULL) decode_xyz(l, records, count, to->xyz + 3 * (size_t)begin);
-    if (l->has_rgb) show_rgb(l, records, count, rgbi, to->rgbi_stride);
+    if (l->has_rgb && l->rgb_is_16) show_rgb_16(l, records, count, rgbi, to->rgbi_stride);
+    else if (l->has_rgb) show_rgb_8(l, records, count, rgbi, to->rgbi_stride);
     else show_intensity(l, records, count, rgbi, to->rgbi_stride);
     uint32_t k = 0;
     if (l->has_old_head && is_row(l, to, OLD_HEAD_FIELDS)) {

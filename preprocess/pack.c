@@ -1,6 +1,7 @@
 #include "preprocess/pack.h"
 
 #include "mospt/hash.h"
+#include "mospt/wide.h"
 #include "preprocess/bytes.h"
 
 #include <math.h>
@@ -76,35 +77,55 @@ static bool is_same_lattice(const prep_packed *packed, const mospt_grid *grid)
     return same;
 }
 
-/* Moves coordinates along one axis from the lattice of a file to the grid. Returns false if one of
- * them is outside the root cube. */
-static bool pack_axis(const mospt_grid *grid, int a, const uint8_t *from, size_t from_stride,
-                      uint32_t count, uint8_t *to, size_t stride, prep_pack_sums *sums)
+/* Three coordinates and one lane to spare, as a vector unit takes them. */
+typedef int32_t lanes __attribute__((vector_size(16)));
+typedef uint32_t cells __attribute__((vector_size(16)));
+
+static lanes load_lanes(const uint8_t *from)
 {
-    uint64_t width = UINT64_C(1) << grid->bits, first = grid->root[a];
-    int64_t base = grid->base[a];
-    uint32_t low = sums->low[a], high = sums->high[a];
-    bool outside = false;
-    for (uint32_t i = 0; i < count; i++, from += from_stride, to += stride) {
-        int64_t cell = (int32_t)prep_le32(from) - base;
-        uint32_t g = (uint32_t)cell;
-        outside |= (uint64_t)cell - first >= width;
-        low = g < low ? g : low;
-        high = g > high ? g : high;
-        memcpy(to, &g, sizeof g);
-    }
-    sums->low[a] = low;
-    sums->high[a] = high;
-    return !outside;
+    lanes v;
+    memcpy(&v, from, sizeof v);
+    if (prep_host_is_big_endian())
+        for (int a = 0; a < 4; a++)
+            v[a] = (int32_t)prep_swap32((uint32_t)v[a]);
+    return v;
 }
 
-/* As pack_positions() for records of the same lattice. */
-static void pack_lattice(const mospt_grid *grid, const prep_packed *packed, const uint8_t *from,
-                         uint32_t count, uint8_t *records, size_t stride, prep_pack_sums *sums)
+static lanes pick(lanes mask, lanes yes, lanes no)
 {
-    for (int a = 0; a < 3; a++)
-        if (!pack_axis(grid, a, from + 4 * a, packed->stride, count, records + 4 * a, stride, sums))
+    return (mask & yes) | (~mask & no);
+}
+
+/* Takes the range of the file's own coordinates into the sums. */
+static void add_range(const mospt_grid *grid, lanes low, lanes high, prep_pack_sums *sums)
+{
+    uint64_t width = UINT64_C(1) << grid->bits;
+    for (int a = 0; a < 3; a++) {
+        int64_t first = low[a] - grid->base[a], last = high[a] - grid->base[a];
+        if ((uint64_t)first - grid->root[a] >= width || (uint64_t)last - grid->root[a] >= width)
             sums->outside = true;
+        if ((uint32_t)first < sums->low[a]) sums->low[a] = (uint32_t)first;
+        if ((uint32_t)last > sums->high[a]) sums->high[a] = (uint32_t)last;
+    }
+}
+
+/* As pack_positions() for records of the same lattice. They are 16 bytes at least, and so are those
+ * that are made: what is written behind the coordinates is written again by those who come after.
+ */
+MOSPT_WIDE static void pack_lattice(const mospt_grid *grid, const prep_packed *packed,
+                                    const uint8_t *from, uint32_t count, uint8_t *records,
+                                    size_t stride, prep_pack_sums *sums)
+{
+    cells base = {(uint32_t)grid->base[0], (uint32_t)grid->base[1], (uint32_t)grid->base[2]};
+    lanes low = load_lanes(from), high = low;
+    for (uint32_t i = 0; i < count; i++, from += packed->stride, records += stride) {
+        lanes v = load_lanes(from);
+        cells cell = (cells)v - base;
+        low = pick(v < low, v, low);
+        high = pick(v > high, v, high);
+        memcpy(records, &cell, sizeof cell);
+    }
+    add_range(grid, low, high, sums);
 }
 
 /* The same value in every row. */
@@ -241,13 +262,13 @@ static void pack_packed(const prep_packer *p, const origins *o, const prep_batch
         to.plane_stride[plane] = converted ? batch->plane_size[plane] : stride;
         spare += converted ? count * batch->plane_size[plane] : 0;
     }
+    if (same_lattice) pack_lattice(p->grid, packed, from, count, records, stride, sums);
     packed->unpack(packed->layout, from, count, &to);
     for (uint32_t k = 0; k < p->schema->count; k++)
         if (is_converted(p, o, k))
             convert_plane(to.plane[o->plane[k]], &p->planes->at[o->plane[k]], &p->schema->at[k],
                           count, rows_of(p, k, records), stride);
-    if (same_lattice) pack_lattice(p->grid, packed, from, count, records, stride, sums);
-    else pack_positions(p->grid, xyz, count, records, stride, sums);
+    if (!same_lattice) pack_positions(p->grid, xyz, count, records, stride, sums);
 }
 
 /* As many points as have room for what is converted of them. */

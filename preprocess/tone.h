@@ -44,8 +44,8 @@ static inline uint8_t prep_scale_apply(const prep_scale *s, double value)
     return shown >= 255 ? 255 : shown > 0 ? (uint8_t)shown : 0; /* NaN is 0 */
 }
 
-/* 16-bit colour to 8 bits, rounded to nearest. */
+/* 16-bit colour to 8 bits: value * 255 / 65535, rounded to nearest. */
 static inline uint8_t prep_tone_from_16(uint32_t value)
 {
-    return (uint8_t)((value * 255 + 32767) / 65535);
+    return (uint8_t)((value * 255 + 32895) >> 16);
 }
