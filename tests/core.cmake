@@ -7,7 +7,7 @@ add_library(core_tools STATIC core_tools.c ref_mospt.c ref_tree.c core_scans.c)
 target_link_libraries(core_tools PUBLIC flags mospt prep PkgConfig::CMOCKA)
 
 foreach(name
-        err schema grid hierarchy linear payload metadata sink dataset
+        err schema grid cell hierarchy linear payload metadata sink dataset
         arena sort spool workers plan solve pass dedupe frame build pose inspect)
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE core_tools)

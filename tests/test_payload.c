@@ -31,7 +31,9 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
     /* Whole blocks of 2^SHIFT, as a spool has them. */
     for (uint32_t b = 0; b <= record_count >> SHIFT; b++)
         blocks[b] = records + ((size_t)b << SHIFT) * stride;
-    mospt_payload_pack(schema, &(mospt_records){blocks, stride, SHIFT}, order, count, out, &node);
+    uint64_t hash = mospt_payload_pack(schema, &(mospt_records){blocks, stride, SHIFT}, order,
+                                       count, out, &node);
+    assert_true(hash == mospt_hash_records(picked, stride, count));
     assert_int_equal(out[count * stride], 0xa5);
     assert_int_equal(node.count, count);
     assert_int_equal(node.level, 3);
