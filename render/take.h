@@ -45,7 +45,7 @@ typedef struct {
     rend_camera camera;     /* at the frame's time */
     bool has_clip;
     rend_box clip;
-    uint32_t pending;       /* live: nodes that were missing */
+    uint32_t pending; /* live: nodes that were missing */
 } rend_taken;
 
 /* Where the time went, seconds since the start. */

@@ -145,8 +145,8 @@ static void every_frame_is_the_shot_of_its_camera(void **unused)
     const mospt_metadata *site = &s.site.dataset->metadata;
     for (int i = 1; i < 4; i++) {
         s.path.keys[i].has_clip = true;
-        s.path.keys[i].clip = (rend_box){{-INFINITY, -INFINITY, -INFINITY},
-                                         {INFINITY, INFINITY, site->high[2] / i}};
+        s.path.keys[i].clip =
+            (rend_box){{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, site->high[2] / i}};
     }
     CORE_NEED(rend_curve_create(&s.path, &curve, &err));
     char *film = core_path(s.site.folder, "f.png"), *shot = core_path(s.site.folder, "shot.png");

@@ -147,6 +147,16 @@ static void cache_sizes_do_not_show(void **unused)
          (rend_shot_options){.limits = {.ram_cache_bytes = 1, .gpu_cache_bytes = 1}}, &paged);
     assert_same_picture(&site, "a.png", &site, "b.png");
     assert_int_equal(all.points_drawn, paged.points_drawn);
+    for (int shape = 0; shape < REND_SHAPE_COUNT; shape++) { /* every point drawn twice */
+        const rend_look look = {.blend_slab = 0.02f, .shape = (rend_shape)shape, .fill_px = 2};
+        take(&site, "a.png", (rend_shot_options){.look = look}, &all);
+        take(&site, "b.png",
+             (rend_shot_options){.look = look,
+                                 .limits = {.ram_cache_bytes = 1, .gpu_cache_bytes = 1}},
+             &paged);
+        assert_same_picture(&site, "a.png", &site, "b.png");
+        assert_int_equal(all.points_drawn, paged.points_drawn);
+    }
     render_site_fini(&site);
 }
 
@@ -193,9 +203,14 @@ static void every_look_can_be_drawn(void **unused)
                               .point_px = 5};
             look.point_m = 3 * (float)site.dataset->metadata.grid.step,
             look.no_edl = mode == REND_SIZE_FIXED;
-            take(&site, "a.png", (rend_shot_options){.look = look, .width = 37, .height = 23},
-                 &result);
-            assert_true(result.points_drawn > 0);
+            for (int s = 0; s < 4 * REND_SHAPE_COUNT; s++) {
+                look.shape = (rend_shape)(s / 4);
+                look.blend_slab = s & 1 ? 0.01f : 0;
+                look.fill_px = s & 2 ? 1 : 0;
+                take(&site, "a.png", (rend_shot_options){.look = look, .width = 37, .height = 23},
+                     &result);
+                assert_true(result.points_drawn > 0);
+            }
         }
     render_site_fini(&site);
 }

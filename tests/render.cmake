@@ -24,6 +24,11 @@ target_link_libraries(e2e_shot PRIVATE render_tools PkgConfig::PNG)
 add_test(NAME e2e_shot COMMAND e2e_shot)
 set_tests_properties(e2e_shot PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
 
+add_executable(e2e_shading e2e_shading.c keep_libraries.c)
+target_link_libraries(e2e_shading PRIVATE render_tools)
+add_test(NAME e2e_shading COMMAND e2e_shading)
+set_tests_properties(e2e_shading PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+
 add_executable(e2e_colour e2e_colour.c keep_libraries.c)
 target_link_libraries(e2e_colour PRIVATE render_tools PkgConfig::PNG)
 add_test(NAME e2e_colour COMMAND e2e_colour)
