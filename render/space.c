@@ -1,18 +1,16 @@
 #include "render/space.h"
 
-#include "render/camera.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { CELLS_MAX = 4 << 20, FILLED_POINTS = 2 };
+enum { CELLS_MAX = 16 << 20, FILLED_POINTS = 2 };
 #define CELL_MIN_M 0.25
 #define POINTS_MAX UINT64_C(40000000)
 #define COST_SOLID 100.0f
 #define COST_NO_FLOOR 20.0f
 #define COST_NARROW 3.0f
-#define COST_PER_M 2.0f
+#define COST_PER_M 10.0f /* up or down: a way around is better than a jump */
 
 size_t rend_space_cells(const rend_space *space)
 {
@@ -46,15 +44,16 @@ void rend_space_middle(const rend_space *space, size_t cell, double world[3])
 
 /* ---- making one ---- */
 
-static bool lay_out(const mospt_dataset *dataset, rend_space *s, mospt_err *err)
+static bool lay_out(const rend_box *part, rend_space *s, mospt_err *err)
 {
-    double high[3], volume = 1;
-    rend_camera_bounds(dataset, s->low, high);
-    for (int a = 0; a < 3; a++)
-        volume *= fmax(high[a] - s->low[a], CELL_MIN_M);
+    double volume = 1;
+    for (int a = 0; a < 3; a++) {
+        s->low[a] = part->low[a];
+        volume *= fmax(part->high[a] - part->low[a], CELL_MIN_M);
+    }
     s->cell_m = fmax(CELL_MIN_M, cbrt(volume / CELLS_MAX));
     for (int a = 0; a < 3; a++)
-        s->size[a] = (uint32_t)fmin(ceil((high[a] - s->low[a]) / s->cell_m) + 2, CELLS_MAX);
+        s->size[a] = (uint32_t)fmin(ceil((part->high[a] - s->low[a]) / s->cell_m) + 2, CELLS_MAX);
     s->floor = calloc(rend_space_cells(s), 1);
     s->narrow = calloc(rend_space_cells(s), 1);
     return (s->floor != NULL && s->narrow != NULL) || mospt_err_nomem(err, 2 * rend_space_cells(s));
@@ -101,15 +100,36 @@ static bool fill(const mospt_dataset *dataset, rend_space *s, mospt_err *err)
     return true;
 }
 
-static bool has_filled_neighbour(const rend_space *s, size_t x, size_t y, size_t z)
+/* Marks what has something within `reach` cells of it along one axis of its layer. */
+static void widen(uint8_t *out, const uint8_t *in, size_t count, size_t stride, size_t reach)
 {
-    for (size_t ny = y > 0 ? y - 1 : 0; ny <= y + 1 && ny < s->size[1]; ny++)
-        for (size_t nx = x > 0 ? x - 1 : 0; nx <= x + 1 && nx < s->size[0]; nx++)
-            if (s->floor[(z * s->size[1] + ny) * s->size[0] + nx] == 0) return true;
-    return false;
+    for (size_t i = 0; i < count; i++) {
+        size_t from = i > reach ? i - reach : 0, to = i + reach < count ? i + reach : count - 1;
+        uint8_t any = 0;
+        for (size_t j = from; j <= to; j++)
+            any |= in[j * stride];
+        out[i * stride] = any;
+    }
 }
 
-void rend_space_derive(rend_space *space)
+static bool set_narrow(rend_space *s)
+{
+    size_t reach = (size_t)ceil(REND_SHOULDER_M / s->cell_m), cells = rend_space_cells(s);
+    size_t layer = (size_t)s->size[0] * s->size[1];
+    uint8_t *rows = malloc(cells);
+    if (rows == NULL) return false;
+    for (size_t c = 0; c < cells; c++)
+        s->narrow[c] = s->floor[c] == 0;
+    for (size_t row = 0; row < cells; row += s->size[0])
+        widen(rows + row, s->narrow + row, s->size[0], 1, reach);
+    for (size_t z = 0; z < s->size[2]; z++)
+        for (size_t x = 0; x < s->size[0]; x++)
+            widen(s->narrow + z * layer + x, rows + z * layer + x, s->size[1], s->size[0], reach);
+    free(rows);
+    return true;
+}
+
+bool rend_space_derive(rend_space *space)
 {
     size_t layer = (size_t)space->size[0] * space->size[1], cells = rend_space_cells(space);
     for (size_t c = 0; c < cells; c++) {
@@ -117,23 +137,18 @@ void rend_space_derive(rend_space *space)
         uint8_t below = c >= layer ? space->floor[c - layer] : REND_NO_FLOOR;
         space->floor[c] = below == REND_NO_FLOOR ? REND_NO_FLOOR : (uint8_t)(below + 1);
     }
-    for (size_t c = 0; c < cells; c++) {
-        size_t at[3];
-        split(space, c, at);
-        space->narrow[c] = has_filled_neighbour(space, at[0], at[1], at[2]);
-    }
+    return set_narrow(space);
 }
 
-bool rend_space_make(const mospt_dataset *dataset, rend_space *out, mospt_err *err)
+bool rend_space_make(const mospt_dataset *dataset, const rend_box *part, rend_space *out,
+                     mospt_err *err)
 {
     rend_space s = {0};
-    if (!lay_out(dataset, &s, err) || !fill(dataset, &s, err)) {
-        rend_space_fini(&s);
-        return false;
-    }
-    rend_space_derive(&s);
-    *out = s;
-    return true;
+    bool ok = lay_out(part, &s, err) && fill(dataset, &s, err) &&
+              (rend_space_derive(&s) || mospt_err_nomem(err, rend_space_cells(&s)));
+    if (ok) *out = s;
+    else rend_space_fini(&s);
+    return ok;
 }
 
 void rend_space_fini(rend_space *space)
@@ -151,6 +166,78 @@ float rend_space_cost(const rend_space *space, size_t cell, double eye_m)
     if (floor_cells == REND_NO_FLOOR) return 1 + COST_NO_FLOOR + narrow;
     double off = fabs((floor_cells - 0.5) * space->cell_m - eye_m) - space->cell_m / 2;
     return 1 + narrow + fminf(COST_PER_M * (float)fmax(off, 0), COST_NO_FLOOR);
+}
+
+/* ---- on foot ---- */
+
+/* Cells that hang together, one component after the other; each is marked with its number. */
+typedef struct {
+    const rend_space *space;
+    uint32_t *part; /* [cells], owned: 0 not walkable, 1 not seen yet, else its number */
+    uint32_t *open; /* owned: cells whose neighbours are still to be looked at */
+    size_t count, capacity;
+} flood;
+
+static bool add_open(flood *f, size_t cell, uint32_t number)
+{
+    if (f->count == f->capacity) {
+        size_t capacity = f->capacity > 0 ? 2 * f->capacity : 1 << 12;
+        void *larger = realloc(f->open, capacity * sizeof *f->open);
+        if (larger == NULL) return false;
+        f->open = larger, f->capacity = capacity;
+    }
+    f->part[cell] = number;
+    f->open[f->count++] = (uint32_t)cell;
+    return true;
+}
+
+/* The neighbour number n of 27; false if there is none. */
+static bool neighbour_at(const rend_space *s, size_t cell, int n, size_t *out)
+{
+    size_t at[3], to[3];
+    split(s, cell, at);
+    const int d[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+    for (int a = 0; a < 3; a++) {
+        to[a] = at[a] + (size_t)d[a]; /* wraps below zero */
+        if (to[a] >= s->size[a]) return false;
+    }
+    *out = (to[2] * s->size[1] + to[1]) * s->size[0] + to[0];
+    return *out != cell;
+}
+
+static bool flood_from(flood *f, size_t cell, uint32_t number, size_t *size)
+{
+    bool ok = add_open(f, cell, number);
+    for (*size = 0; ok && f->count > 0; ++*size) {
+        size_t here = f->open[--f->count], next;
+        for (int n = 0; ok && n < 27; n++)
+            if (neighbour_at(f->space, here, n, &next) && f->part[next] == 1)
+                ok = add_open(f, next, number);
+    }
+    return ok;
+}
+
+bool rend_space_walkable(const rend_space *space, double eye_m, uint8_t **on_foot, mospt_err *err)
+{
+    size_t cells = rend_space_cells(space), largest = 0;
+    uint32_t number = 1, found = 0;
+    flood f = {.space = space, .part = malloc(cells * sizeof *f.part)};
+    uint8_t *result = malloc(cells);
+    bool ok = f.part != NULL && result != NULL;
+    for (size_t c = 0; ok && c < cells; c++)
+        f.part[c] = rend_space_cost(space, c, eye_m) <= 1;
+    for (size_t c = 0; ok && c < cells; c++) {
+        size_t size;
+        if (f.part[c] != 1) continue;
+        ok = flood_from(&f, c, ++number, &size);
+        if (ok && size > largest) largest = size, found = number;
+    }
+    for (size_t c = 0; ok && c < cells; c++)
+        result[c] = largest > 0 && f.part[c] == found;
+    free(f.part), free(f.open);
+    if (ok) *on_foot = result;
+    else free(result);
+    return ok || mospt_err_nomem(err, 5 * cells);
 }
 
 /* ---- ways ---- */
@@ -229,18 +316,11 @@ static bool visit(search *s, size_t cell, size_t neighbour, float step)
 
 static bool visit_neighbours(search *s, size_t cell)
 {
-    size_t at[3];
-    const uint32_t *size = s->space->size;
-    split(s->space, cell, at);
     for (int n = 0; n < 27; n++) {
-        const int d[3] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-        int axes = abs(d[0]) + abs(d[1]) + abs(d[2]);
-        bool inside = axes > 0;
-        for (int a = 0; a < 3; a++)
-            inside = inside && (int64_t)at[a] + d[a] >= 0 && (int64_t)at[a] + d[a] < size[a];
-        if (!inside) continue;
-        int64_t to = (int64_t)cell + d[0] + (d[1] + (int64_t)d[2] * size[1]) * size[0];
-        if (!visit(s, cell, (size_t)to, sqrtf((float)axes))) return false;
+        size_t next;
+        int axes = (n % 3 != 1) + (n / 3 % 3 != 1) + (n / 9 != 1);
+        if (neighbour_at(s->space, cell, n, &next) && !visit(s, cell, next, sqrtf((float)axes)))
+            return false;
     }
     return true;
 }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { ORBIT_KEYS = 36, PLACES_MAX = 7 };
+enum { ORBIT_KEYS = 36, PLACES_MAX = 7, DENSE_LEVELS = 1, PART_LEVELS = 2 };
 #define PI 3.14159265358979323846
 #define FOV_RAD (60 * PI / 180)
 #define ORBIT_S 30.0
@@ -18,6 +18,7 @@ enum { ORBIT_KEYS = 36, PLACES_MAX = 7 };
 #define KEY_M 2.5        /* between two keyframes */
 #define LOOK_AHEAD_M 5.0
 #define PLACES_APART_M 4.0
+#define AROUND_M 12.0 /* of the places: ways around */
 
 static double distance3(const double a[3], const double b[3])
 {
@@ -132,16 +133,43 @@ static bool find_scan_positions(const mospt_dataset *dataset, places *out, mospt
     return true;
 }
 
-/* Free cells at eye height that nothing is near to. */
-static bool find_free_places(const rend_space *space, places *out, mospt_err *err)
+/* Level of the finest node around a place: where a scanner stood, points are dense and nodes small.
+ */
+static uint32_t level_at(const mospt_dataset *dataset, const double world[3])
 {
-    for (size_t c = 0; c < rend_space_cells(space); c++) {
-        double at[3];
-        if (rend_space_cost(space, c, EYE_M) > 1) continue;
-        rend_space_middle(space, c, at);
-        if (!add_place(out, at, err)) return false;
+    const mospt_hierarchy *h = &dataset->hierarchy;
+    uint32_t g[3], node = 0;
+    if (!mospt_grid_from_world(&dataset->metadata.grid, world, g)) return 0;
+    for (uint32_t c = 0; c < h->nodes[node].child_count;) {
+        const mospt_node *child = &h->nodes[h->nodes[node].first_child + c];
+        bool inside = mospt_cell_contains(&dataset->metadata.grid, child->corner, child->level,
+                                          g[0], g[1], g[2]);
+        if (inside) node = h->nodes[node].first_child + c;
+        c = inside ? 0 : c + 1;
     }
-    return true;
+    return h->nodes[node].level;
+}
+
+/* Where one can walk and the floor is as densely scanned as almost nowhere else. */
+static bool find_dense_places(const mospt_dataset *dataset, const rend_space *space, places *out,
+                              mospt_err *err)
+{
+    uint8_t *on_foot = NULL;
+    uint32_t deepest = 0;
+    bool ok = rend_space_walkable(space, EYE_M, &on_foot, err);
+    for (size_t c = 0; ok && c < rend_space_cells(space); c++) {
+        double at[3], floor[3];
+        if (!on_foot[c]) continue;
+        rend_space_middle(space, c, at);
+        memcpy(floor, at, sizeof floor);
+        floor[2] -= space->floor[c] * space->cell_m;
+        uint32_t level = level_at(dataset, floor);
+        if (level > deepest + DENSE_LEVELS) out->count = 0;
+        if (level > deepest) deepest = level;
+        if (level + DENSE_LEVELS >= deepest) ok = add_place(out, at, err);
+    }
+    free(on_foot);
+    return ok;
 }
 
 /* Keeps a few places far from each other: each the farthest from those before. */
@@ -206,7 +234,18 @@ static bool walk(const rend_space *space, const places *stops, places *way, mosp
     return true;
 }
 
-/* Cells make a zigzag: each point becomes the mean of those around it, fewer towards the ends. */
+/* The mean of the points around one. */
+static void mean_of(const places *way, size_t from, size_t to, double out[3])
+{
+    for (int a = 0; a < 3; a++) {
+        out[a] = 0;
+        for (size_t j = from; j <= to; j++)
+            out[a] += way->at[j][a] / (double)(to + 1 - from);
+    }
+}
+
+/* Cells make a zigzag: each point becomes the mean of those around it, of fewer towards the ends
+ * and where the mean would lie beside the free space. */
 static bool smooth(const rend_space *space, places *way, mospt_err *err)
 {
     size_t reach = (size_t)(SMOOTH_M / space->cell_m) + 1;
@@ -214,11 +253,13 @@ static bool smooth(const rend_space *space, places *way, mospt_err *err)
     if (means == NULL) return mospt_err_nomem(err, way->count * sizeof *means);
     for (size_t i = 0; i < way->count; i++) {
         size_t r = reach;
+        float cost = rend_space_cost(space, rend_space_cell(space, way->at[i]), EYE_M);
         if (i < r) r = i;
         if (way->count - 1 - i < r) r = way->count - 1 - i;
-        for (size_t j = i - r; j <= i + r; j++)
-            for (int a = 0; a < 3; a++)
-                means[i][a] += way->at[j][a] / (double)(2 * r + 1);
+        do
+            mean_of(way, i - r, i + r, means[i]);
+        while (rend_space_cost(space, rend_space_cell(space, means[i]), EYE_M) > cost + 3 &&
+               r-- > 0);
     }
     free(way->at);
     way->at = means;
@@ -262,32 +303,71 @@ static bool make_keys(const places *way, rend_path *path, mospt_err *err)
     return true;
 }
 
-static bool make_walk(const mospt_dataset *dataset, const rend_space *space, rend_path *path,
-                      mospt_err *err)
+/* ---- the part of the site to walk through ---- */
+
+static void include(rend_box *box, const double at[3])
+{
+    for (int a = 0; a < 3; a++) {
+        box->low[a] = fmin(box->low[a], at[a]);
+        box->high[a] = fmax(box->high[a], at[a]);
+    }
+}
+
+/* Around the places, or around all that is densely scanned. */
+static rend_box part_around(const mospt_dataset *dataset, const places *stops)
+{
+    const mospt_hierarchy *h = &dataset->hierarchy;
+    const mospt_grid *grid = &dataset->metadata.grid;
+    rend_box part = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}, all;
+    uint32_t deepest = 0;
+    for (uint32_t n = 0; n < h->count; n++)
+        if (h->nodes[n].level > deepest) deepest = h->nodes[n].level;
+    for (size_t i = 0; stops->count >= 2 && i < stops->count; i++)
+        include(&part, stops->at[i]);
+    for (uint32_t n = 0; stops->count < 2 && n < h->count; n++) {
+        double low[3], high[3], width;
+        if (deepest - h->nodes[n].level > PART_LEVELS) continue;
+        width = (double)mospt_cell_width(grid, h->nodes[n].level) * grid->step;
+        mospt_grid_to_world(grid, h->nodes[n].corner, low);
+        for (int a = 0; a < 3; a++)
+            high[a] = low[a] + width;
+        include(&part, low), include(&part, high);
+    }
+    rend_camera_bounds(dataset, all.low, all.high);
+    for (int a = 0; a < 3; a++) {
+        part.low[a] = fmax(part.low[a] - AROUND_M, all.low[a]);
+        part.high[a] = fmax(fmin(part.high[a] + AROUND_M, all.high[a]), part.low[a]);
+    }
+    return part;
+}
+
+static bool make_walk(const mospt_dataset *dataset, rend_path *path, mospt_err *err)
 {
     places stops = {0}, way = {0};
+    rend_space space = {0};
     bool ok = find_scan_positions(dataset, &stops, err);
+    const rend_box part = part_around(dataset, &stops);
+    ok = ok && rend_space_make(dataset, &part, &space, err);
     if (ok && stops.count < 2) {
         stops.count = 0;
-        ok = find_free_places(space, &stops, err);
+        ok = find_dense_places(dataset, &space, &stops, err);
         if (ok) thin_out(&stops), order(&stops);
     }
     if (ok && stops.count < 2)
         ok = mospt_err_set(
             err, MOSPT_EINVAL, mospt_nowhere(),
             "there is no free way to walk through this site; --orbit turns around it");
-    ok = ok && walk(space, &stops, &way, err) && smooth(space, &way, err) &&
+    ok = ok && walk(&space, &stops, &way, err) && smooth(&space, &way, err) &&
          make_keys(&way, path, err);
     free(stops.at), free(way.at);
+    rend_space_fini(&space);
     return ok;
 }
 
 bool rend_tour_walk(const mospt_dataset *dataset, rend_path *out, mospt_err *err)
 {
-    rend_space space = {0};
     rend_path path = {0};
-    bool ok = rend_space_make(dataset, &space, err) && make_walk(dataset, &space, &path, err);
-    rend_space_fini(&space);
+    bool ok = make_walk(dataset, &path, err);
     if (ok) *out = path;
     else rend_path_fini(&path);
     return ok;

@@ -20,7 +20,7 @@ static rend_space house(void)
                 bool wall = x == 20 && (y < 22 || y > 26);
                 s.floor[(z * Y + y) * X + x] = !(z == 0 || wall);
             }
-    rend_space_derive(&s);
+    assert_true(rend_space_derive(&s));
     return s;
 }
 
@@ -37,6 +37,7 @@ static void the_floor_is_as_far_down_as_it_is(void **unused)
         assert_int_equal(s.floor[cell(3, 3, z)], z);
         assert_int_equal(s.floor[cell(20, 3, z)], 0);
         assert_int_equal(s.narrow[cell(19, 3, z)], 1);
+        assert_int_equal(s.narrow[cell(18, 3, z)], 1);
         if (z > 0) assert_int_equal(s.narrow[cell(17, 3, z)], 0);
     }
     for (size_t c = 0; c < X * Y * Z; c += 7) {
@@ -65,6 +66,27 @@ static void the_way_goes_through_the_door_at_eye_height(void **unused)
         assert_true(labs(x) <= 1 && labs(y) <= 1 && labs(z) <= 1);
     }
     free(cells);
+    rend_space_fini(&s);
+}
+
+static void one_can_walk_where_the_floor_hangs_together(void **unused)
+{
+    (void)unused;
+    rend_space s = house();
+    mospt_err err = {0};
+    uint8_t *on_foot;
+    /* A table in the larger room, whose top is no place to walk on; and no door. */
+    for (int z = 0; z < Z; z++)
+        for (int y = 0; y < Y; y++)
+            s.floor[cell(12, y, z)] = s.floor[cell(20, y, z)] = 0;
+    for (int x = 25; x < 29; x++)
+        s.floor[cell(x, 10, 3)] = 0;
+    assert_true(rend_space_derive(&s));
+    CORE_NEED(rend_space_walkable(&s, 1.65, &on_foot, &err));
+    for (size_t c = 0; c < X * Y * Z; c++)
+        if (on_foot[c]) assert_true(c % X > 20 && s.floor[c] >= 6 && s.floor[c] <= 8);
+    assert_true(on_foot[cell(32, 10, 7)] && !on_foot[cell(27, 10, 7)]);
+    free(on_foot);
     rend_space_fini(&s);
 }
 
@@ -151,6 +173,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_floor_is_as_far_down_as_it_is),
         cmocka_unit_test(the_way_goes_through_the_door_at_eye_height),
+        cmocka_unit_test(one_can_walk_where_the_floor_hangs_together),
         cmocka_unit_test(where_there_is_no_way_it_goes_through_the_wall_once),
         cmocka_unit_test(a_tour_visits_the_scan_positions_in_order),
         cmocka_unit_test(an_orbit_sees_the_whole_site_from_all_sides),
