@@ -184,6 +184,13 @@ static bool o_depth(cli_options *o, const char *v)
 {
     return read_u32(v, 1, 9, &o->inner_depth);
 }
+static bool o_renderer(cli_options *o, const char *v)
+{
+    static const char *const names[] = {"auto", "gl", "cpu"}; /* of rend_renderer */
+    for (int i = 0; i < 3; i++)
+        if (strcmp(v, names[i]) == 0) return o->renderer = (rend_renderer)i, true;
+    return false;
+}
 static bool o_ram(cli_options *o, const char *v)
 {
     return read_amount(v, 1024, &o->limits.ram_cache_bytes);
@@ -521,7 +528,7 @@ static const struct {
      "one dataset per scan file, in the folder -o; only what has changed is built"},
     {"force", NULL, 0, B | V, o_force, "replace a dataset that is there"},
     {"threads", "N", 0, B | V | S | R, o_threads,
-     "threads of the builder (default: one per processor)"},
+     "threads of the builder and of --renderer cpu (default: one per processor)"},
     {"memory", "SIZE", 0, B | V | S | R, o_memory,
      "most memory the build takes, 64M or more (default: a quarter of the machine)"},
     {"temp-dir", "FOLDER", 0, B | V | S | R, o_temp_dir,
@@ -583,6 +590,8 @@ static const struct {
     {"target", "X,Y,Z", 0, V | S, o_target, "what it looks at"},
     {"up", "X,Y,Z", 0, V | S, o_up, "which way is up: a direction, or x, y, z (default: z)"},
     {"fov", "DEGREES", 0, V | S, o_fov, "vertical field of view, 1 to 170 (default: 60)"},
+    {"renderer", "NAME", 0, V | S | R, o_renderer,
+     "gl, cpu, or auto (default): cpu where OpenGL would draw on the processor too"},
     {"ram-cache", "SIZE", 0, V | S | R, o_ram, "most memory for loaded nodes (default: 1G)"},
     {"gpu-cache", "SIZE", 0, V | S | R, o_gpu, "most graphics memory for nodes (default: 1G)"},
     {"frames", "N", 0, V, o_frames, "close the window after so many frames"},

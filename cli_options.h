@@ -44,6 +44,7 @@ typedef struct {
     rend_camera_options camera;
     rend_look look;
     rend_limits limits;
+    rend_renderer renderer;
     const char *camera_path; /* file with keyframes */
     cli_film_options film;
 } cli_options;

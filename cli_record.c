@@ -69,7 +69,8 @@ static rend_record_options record_options(const cli_options *o, const rend_path 
                  .counter = f->counter,
                  .legend = o->legend,
                  .look = o->look,
-                 .limits = o->limits},
+                 .limits = o->limits,
+                 .engine = {o->renderer, o->threads}},
         .codec = f->codec,
         .preset = strcmp(preset, "fast") == 0   ? RFILM_FAST
                   : strcmp(preset, "slow") == 0 ? RFILM_SLOW

@@ -329,7 +329,8 @@ static int command_shot(const cli_options *o)
                                        .camera = o->camera,
                                        .look = o->look,
                                        .legend = o->legend,
-                                       .limits = o->limits};
+                                       .limits = o->limits,
+                                       .engine = {o->renderer, o->threads}};
     bool opened = place_open(o, NULL, &p, &err), fits = opened && has_colours(o, &p);
     bool ok = fits && rend_shot(p.dataset, &options, &result, &err);
     if (ok) {
@@ -377,6 +378,7 @@ static int command_view(const cli_options *o)
                                        .camera = o->camera,
                                        .look = o->look,
                                        .limits = o->limits,
+                                       .engine = {o->renderer, o->threads},
                                        .frames = o->frames,
                                        .screenshot = o->screenshot,
                                        .path = o->camera_path,

@@ -106,6 +106,18 @@ typedef struct {
                                  render/select.h */
 } rend_limits;
 
+/* What draws. */
+typedef enum {
+    REND_RENDERER_AUTO, /* the graphics card; the processor where OpenGL would draw on it too */
+    REND_RENDERER_GL,
+    REND_RENDERER_CPU,
+} rend_renderer;
+
+typedef struct {
+    rend_renderer renderer;
+    uint32_t threads; /* of REND_RENDERER_CPU; 0: one per processor */
+} rend_engine_options;
+
 #define REND_VIEW_BUDGET_DEFAULT UINT64_C(3000000)
 #define REND_RAM_CACHE_DEFAULT (1024 * REND_MIB)
 #define REND_GPU_CACHE_DEFAULT (1024 * REND_MIB)

@@ -1,6 +1,6 @@
 #include "render/shot.h"
 
-#include "render/gl/context.h"
+#include "render/engine.h"
 #include "render/image.h"
 #include "render/stage.h"
 
@@ -73,16 +73,14 @@ bool rend_shot(const mospt_dataset *dataset, const rend_shot_options *options,
     rend_view_of view;
     if (!make_view(dataset, options, &view, err)) return false;
     rend_shot_result shot = {0};
-    rgl_context *context = NULL;
-    rgl *gl = NULL;
+    rend_engine engine = {0};
     size_t size = (size_t)view.width * view.height * 3;
     uint8_t *rgb = malloc(size);
     bool ok = rgb != NULL || mospt_err_nomem(err, size);
-    ok = ok && rgl_context_create(&context, err) && rgl_gl_create(&gl, err) &&
-         draw(dataset, gl, options, &view, rgb, &shot, err) &&
+    ok = ok && rend_engine_open(&options->engine, &engine, err) &&
+         draw(dataset, engine.gl, options, &view, rgb, &shot, err) &&
          rend_image_write(options->path, rgb, view.width, view.height, err);
-    rgl_destroy(gl);
-    rgl_context_destroy(context);
+    rend_engine_close(&engine);
     free(rgb);
     shot.total_ms = now_ms() - start;
     if (ok && result != NULL) *result = shot;

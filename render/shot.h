@@ -1,7 +1,7 @@
 /* render/shot.h - one picture of a dataset, without a display.
  *
  * The same dataset and options give the same picture, byte for byte, on the same graphics driver,
- * whatever the cache sizes. */
+ * or on any processor, whatever the cache sizes and the number of threads. */
 #pragma once
 #include "mospt/dataset.h"
 #include "render/options.h"
@@ -13,6 +13,7 @@ typedef struct {
     rend_look look;
     bool legend;        /* what the colours mean, in the picture */
     rend_limits limits; /* budget_points 0: all */
+    rend_engine_options engine;
 } rend_shot_options;
 
 typedef struct {

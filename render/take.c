@@ -2,7 +2,7 @@
 
 #include "render/caption.h"
 #include "render/choice.h"
-#include "render/gl/context.h"
+#include "render/engine.h"
 #include "render/panorama.h"
 
 #include <inttypes.h>
@@ -22,8 +22,7 @@ struct rend_take {
     uint32_t pass_width, pass_height;     /* of a view, reduced */
     uint32_t canvas_width, canvas_height; /* of all views side by side, or one below the other */
     bool direct;                          /* what is read back is the picture */
-    rgl_context *context;
-    rgl *gl;
+    rend_engine engine;
     rend_stage *stage;
     rend_caption caption;
     bool has_caption;
@@ -114,8 +113,8 @@ bool rend_take_create(const mospt_dataset *dataset, const rend_take_options *opt
     t->has_caption = has_words(options);
     bool ok = lay_out(t, err);
     scale_look(t);
-    ok = ok && rgl_context_create(&t->context, err) && rgl_gl_create(&t->gl, err) &&
-         rend_stage_create(dataset, t->gl, &options->limits, NULL, NULL, &t->stage, err) &&
+    ok = ok && rend_engine_open(&options->engine, &t->engine, err) &&
+         rend_stage_create(dataset, t->engine.gl, &options->limits, NULL, NULL, &t->stage, err) &&
          (!t->has_caption || rend_caption_init(options->height * t->samples, &t->caption, err));
     if (!ok) rend_take_destroy(t);
     else *out = t;
@@ -127,8 +126,7 @@ void rend_take_destroy(rend_take *take)
     if (take == NULL) return;
     rend_caption_fini(&take->caption);
     rend_stage_destroy(take->stage);
-    rgl_destroy(take->gl);
-    rgl_context_destroy(take->context);
+    rend_engine_close(&take->engine);
     rend_panorama_fini(&take->panorama);
     free(take->raw);
     free(take->sums);
@@ -251,10 +249,10 @@ static bool expect(rend_take *t, const rend_view_of *view, mospt_err *err)
 static bool read_back(rend_take *t, const rend_view_of *view, uint8_t *rgb, mospt_err *err)
 {
     double start = now_s();
-    if (!rgl_read_pixels(t->gl, false, 1, 1, rgb, err)) return false;
+    if (!rgl_read_pixels(t->engine.gl, false, 1, 1, rgb, err)) return false;
     double drawn = now_s();
     t->spent.drawing += drawn - start;
-    if (!rgl_read_pixels(t->gl, false, view->width, view->height, rgb, err)) return false;
+    if (!rgl_read_pixels(t->engine.gl, false, view->width, view->height, rgb, err)) return false;
     t->spent.reading += now_s() - drawn;
     return true;
 }
@@ -364,5 +362,5 @@ void rend_take_figures(const rend_take *take, rend_figures *out)
 
 const char *rend_take_renderer(const rend_take *take)
 {
-    return rgl_renderer(take->gl);
+    return rgl_renderer(take->engine.gl);
 }

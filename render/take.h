@@ -28,6 +28,7 @@ typedef struct {
     rend_look look;
     rend_limits limits; /* budget_points 0: all; a keyframe may want less; of a frame, so shared by
                            two eyes, or six faces */
+    rend_engine_options engine;
 } rend_take_options;
 
 typedef struct {
@@ -55,7 +56,7 @@ typedef struct {
 
 typedef struct rend_take rend_take;
 
-/* Makes a context of its own.
+/* Opens an engine of its own.
  * dataset, options   borrowed
  * errors   MOSPT_EINVAL (options), MOSPT_EIO (no driver), MOSPT_ENOMEM */
 bool rend_take_create(const mospt_dataset *dataset, const rend_take_options *options,

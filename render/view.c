@@ -1,5 +1,6 @@
 #include "render/view.h"
 
+#include "render/engine.h"
 #include "render/gl/text.h"
 #include "render/gl/window.h"
 #include "render/hud.h"
@@ -34,7 +35,7 @@ typedef struct {
     const mospt_dataset *dataset;
     const rend_view_options *options;
     rgl_window *window;
-    rgl *gl;
+    rend_engine engine;
     rgl_text *text; /* NULL: no font */
     float text_scale;
     rend_stage *stage;
@@ -81,7 +82,7 @@ static void tell(viewer *v, const char *what)
 static double distance_at(viewer *v, double x, double y, bool *hit)
 {
     float depths[(2 * PICK_RADIUS_PX + 1) * (2 * PICK_RADIUS_PX + 1)], nearest = 1;
-    if (rgl_read_depth(v->gl, (int)x, (int)y, PICK_RADIUS_PX, depths, NULL))
+    if (rgl_read_depth(v->engine.gl, (int)x, (int)y, PICK_RADIUS_PX, depths, NULL))
         for (size_t i = 0; i < sizeof depths / sizeof *depths; i++)
             nearest = fminf(nearest, depths[i]);
     *hit = nearest < 1;
@@ -239,7 +240,7 @@ static void save_picture(viewer *v)
     strftime(name, sizeof name, "instantpoints-%Y%m%d-%H%M%S.png", &local);
     bool ok = rgb != NULL || mospt_err_nomem(&err, size);
     ok = ok && rend_stage_frame(v->stage, &still, &ignored, &err) &&
-         rgl_read_pixels(v->gl, false, still.width, still.height, rgb, &err) &&
+         rgl_read_pixels(v->engine.gl, false, still.width, still.height, rgb, &err) &&
          rend_image_write(name, rgb, still.width, still.height, &err);
     free(rgb);
     if (ok) snprintf(text, sizeof text, "saved %s", name);
@@ -451,7 +452,7 @@ static bool write_screenshot(viewer *v, mospt_err *err)
     size_t size = (size_t)v->view.width * v->view.height * 3;
     uint8_t *rgb = malloc(size);
     bool ok = rgb != NULL || mospt_err_nomem(err, size);
-    ok = ok && rgl_read_pixels(v->gl, true, v->view.width, v->view.height, rgb, err) &&
+    ok = ok && rgl_read_pixels(v->engine.gl, true, v->view.width, v->view.height, rgb, err) &&
          rend_image_write(v->options->screenshot, rgb, v->view.width, v->view.height, err);
     free(rgb);
     return ok;
@@ -556,8 +557,8 @@ static bool open_viewer(viewer *v, mospt_err *err)
     v->view.camera = v->home;
     return rgl_window_create(o->title != NULL ? o->title : v->dataset->path, v->view.width,
                              v->view.height, &v->window, err) &&
-           rgl_gl_create(&v->gl, err) &&
-           rend_stage_create(v->dataset, v->gl, &o->limits, on_loaded, v, &v->stage, err);
+           rend_engine_open_window(&o->engine, &v->engine, err) &&
+           rend_stage_create(v->dataset, v->engine.gl, &o->limits, on_loaded, v, &v->stage, err);
 }
 
 bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
@@ -577,7 +578,7 @@ bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
     rend_strip_fini(&v.strip);
     rgl_text_destroy(v.text);
     rend_stage_destroy(v.stage);
-    rgl_destroy(v.gl);
+    rend_engine_close(&v.engine);
     rgl_window_destroy(v.window);
     return ok;
 }

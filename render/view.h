@@ -9,6 +9,7 @@ typedef struct {
     rend_camera_options camera;
     rend_look look;
     rend_limits limits; /* budget_points 0: REND_VIEW_BUDGET_DEFAULT; REND_ALL: no limit */
+    rend_engine_options engine;
     uint64_t frames; /* quit after so many frames, for scripts and tests; 0: when the user does */
     const char *screenshot; /* of the window, words and all, written before it closes; NULL: none */
     const char *path;       /* camera path to edit, see render/strip.h; NULL: a new one */

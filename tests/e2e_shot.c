@@ -10,12 +10,15 @@
 
 enum { WIDTH = 480, HEIGHT = 270, PIXELS = WIDTH * HEIGHT };
 
+static rend_renderer renderer; /* the program's argument: gl or cpu */
+
 static void take(const render_site *site, const char *name, rend_shot_options options,
                  rend_shot_result *result)
 {
     mospt_err err = {0};
     char *path = core_path(site->folder, "%s", name);
     options.path = path;
+    options.engine.renderer = renderer;
     if (options.width == 0) options.width = WIDTH, options.height = HEIGHT;
     CORE_NEED(rend_shot(site->dataset, &options, result, &err));
     free(path);
@@ -269,8 +272,9 @@ static void damage_is_told_and_drawn_around(void **unused)
     render_site_fini(&site);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    renderer = argc > 1 && strcmp(argv[1], "gl") == 0 ? REND_RENDERER_GL : REND_RENDERER_CPU;
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_points_cover_what_a_plain_draw_covers),
         cmocka_unit_test(seen_from_inside_not_a_pixel_is_missing),

@@ -18,11 +18,19 @@ foreach(name cache camera clip curve loader orbit pages paint panorama path path
     set_tests_properties(${name} PROPERTIES LABELS render TIMEOUT 300)
 endforeach()
 
+# The back end on the processor beside OpenGL's.
+add_executable(test_cpu keep_libraries.c test_cpu.c)
+target_link_libraries(test_cpu PRIVATE render_tools)
+add_test(NAME cpu COMMAND test_cpu)
+set_tests_properties(cpu PROPERTIES LABELS render TIMEOUT 300 ENVIRONMENT "${render_environment}")
+
 # With a context: the software renderer will do, and no display is needed.
 add_executable(e2e_shot e2e_shot.c keep_libraries.c ref_picture.c)
 target_link_libraries(e2e_shot PRIVATE render_tools PkgConfig::PNG)
-add_test(NAME e2e_shot COMMAND e2e_shot)
-set_tests_properties(e2e_shot PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+foreach(renderer gl cpu)
+    add_test(NAME e2e_shot_${renderer} COMMAND e2e_shot ${renderer})
+    set_tests_properties(e2e_shot_${renderer} PROPERTIES LABELS render TIMEOUT 600 ENVIRONMENT "${render_environment}")
+endforeach()
 
 add_executable(e2e_shading e2e_shading.c keep_libraries.c)
 target_link_libraries(e2e_shading PRIVATE render_tools)

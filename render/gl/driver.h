@@ -16,6 +16,9 @@ typedef struct {
     bool (*read_depths)(rgl *gl, float *out, mospt_err *err);
 } rgl_driver;
 
+/* Reads the window's back buffer, for whichever backend has drawn into it. */
+bool rgl_gl_read_window(uint32_t width, uint32_t height, uint8_t *rgb, mospt_err *err);
+
 struct rgl {
     const rgl_driver *driver;
 };

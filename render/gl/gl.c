@@ -240,6 +240,19 @@ static void flip_rows(void *picture, size_t row_size, uint32_t rows)
     }
 }
 
+bool rgl_gl_read_window(uint32_t width, uint32_t height, uint8_t *rgb, mospt_err *err)
+{
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, 0));
+    GL(glReadBuffer(GL_BACK));
+    GL(glPixelStorei(GL_PACK_ALIGNMENT, 1));
+    GL(glReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RGB, GL_UNSIGNED_BYTE, rgb));
+    flip_rows(rgb, (size_t)width * 3, height);
+    GLenum error = glGetError();
+    return error == GL_NO_ERROR ||
+           mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
+                         "the graphics driver reports error 0x%04x at reading the window", error);
+}
+
 static bool gl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height, uint8_t *rgb,
                            mospt_err *err)
 {

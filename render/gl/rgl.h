@@ -1,6 +1,7 @@
 /* render/gl/rgl.h - all that is drawn, in plain structs; no GL header shows here.
  *
- * Two backends implement it: gl.c talks to OpenGL 3.3 core, null.c counts and records, for tests.
+ * Three backends implement it: gl.c talks to OpenGL 3.3 core, render/cpu/cpu.c draws on the
+ * processor, null.c counts and records, for tests; present.c shows in a window what cpu.c drew.
  * One arena of vertices is the GPU cache; what belongs where in it is the caller's business
  * (render/pages.h). Vertices go in as they are in the file, painted (render/paint.h): their r, g
  * and b are what is drawn. A picture is drawn in parts: RGL_BEGIN clears, any number of calls add
@@ -113,6 +114,18 @@ enum {
 /* errors   MOSPT_EINVAL: the context is older than OpenGL 3.3; MOSPT_ENOMEM */
 bool rgl_gl_create(rgl **out, mospt_err *err);
 bool rgl_null_create(rgl **out, mospt_err *err);
+
+/* The picture that a backend has drawn: red in the lowest byte of a pixel, then green and blue, top
+ * row first.
+ * stride   pixels from row to row */
+typedef const uint32_t *rgl_picture_of(const rgl *gl, uint32_t *stride);
+
+/* Makes a backend that draws with another, and shows the picture in the window whose context is
+ * current.
+ * inner    taken if it succeeds
+ * errors   MOSPT_EIO, MOSPT_ENOMEM */
+bool rgl_present_create(rgl *inner, rgl_picture_of *picture_of, rgl **out, mospt_err *err);
+
 void rgl_destroy(rgl *gl);
 
 /* Name of the driver, for people. */

@@ -113,6 +113,17 @@ const char RGL_POINTS_FRAGMENT[] =
     "#endif\n"
     "}\n";
 
+/* A picture as it is, whose first row is the highest. */
+const char RGL_PRESENT_FRAGMENT[] =
+    "uniform sampler2D picture;\n"
+    "uniform int height;\n"
+    "out vec4 result;\n"
+    "void main()\n"
+    "{\n"
+    "    ivec2 p = ivec2(gl_FragCoord.xy);\n"
+    "    result = vec4(texelFetch(picture, ivec2(p.x, height - 1 - p.y), 0).rgb, 1.0);\n"
+    "}\n";
+
 const char RGL_TEXT_VERTEX[] =
     "layout(location = 0) in vec4 corner;\n" /* x, y in pixels from the top left; u, v in texels */
     "layout(location = 1) in vec4 colour;\n"

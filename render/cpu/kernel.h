@@ -1,0 +1,73 @@
+/* render/cpu/kernel.h - the inner loops of a frame, once for each instruction set.
+ *
+ * The same sources are compiled several times (render/CMakeLists.txt), for vectors of as many lanes
+ * as the instruction set has. No product is fused with a sum and every sum has one order, so all of
+ * them draw the same picture, bit for bit.
+ *
+ * A frame is an array of 64-bit numbers, one for each pixel: the bits of the distance w along the
+ * view axis above those of the colour. The nearest point is the minimum, whatever the order in
+ * which points come, and where distances are equal the lowest colour is: pictures do not depend on
+ * how the work was divided. */
+#pragma once
+#include "mospt/point.h"
+
+#include <stdbool.h>
+
+#define RCPU_EMPTY INT64_MAX /* a pixel without a point */
+#define RCPU_SKY INFINITY    /* the logarithm of its distance */
+
+/* A frame of pixels, top row first. */
+typedef struct {
+    uint32_t width, height;
+    uint32_t stride; /* pixels from row to row: a multiple of a cache line, and an odd one, so that
+                        the pixels below each other do not compete for the same places in a cache */
+} rcpu_size;
+
+/* What the points of a batch are drawn with: the terms of RGL_POINTS_VERTEX. */
+typedef struct {
+    rcpu_size size;
+    uint32_t anchor[3];
+    float offset[3], rotation[9], inverse_tan[2];
+    float near_w, far_w;
+    float splat_px, px_min, px_max; /* width of a splat (of a cell of one step) at one step */
+    const uint32_t *octants;        /* NULL: all cells are one step wide */
+    uint32_t grid_bits;
+    bool has_clip;
+    uint32_t clip_low[3], clip_high[3];
+    /* Of splats that are wide enough. */
+    bool round; /* leaves out the corners of the square */
+    float bend; /* a splat bends away from the eye by its width times this at its rim, as a share
+                   of the distance; 0: it does not */
+    float square_px; /* narrower ones are squares, whatever is said here */
+} rcpu_view;
+
+/* What a row is shaded with. */
+typedef struct {
+    rcpu_size size;
+    float edl_strength;
+    int straight, diagonal; /* steps to the neighbours, pixels */
+    uint32_t log_stride;    /* of the logarithms */
+    float background_top[3], background_bottom[3];
+} rcpu_light;
+
+typedef struct {
+    const char *name;
+    /* Draws points of one pixel each, or splats, into a frame.
+     * frame    [stride * height + 1]; what misses the picture goes to the last one */
+    void (*points)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
+                   int64_t *frame);
+    void (*splats)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
+                   int64_t *frame);
+    /* Makes frames[0][0 .. count - 1] the minimum of all and the others empty. A multiple of 16. */
+    void (*merge)(int64_t *const *frames, uint32_t frame_count, size_t from, size_t count);
+    /* log2 of the distances of a row; RCPU_SKY where there is no point. */
+    void (*logs)(const int64_t *row, uint32_t count, float *out);
+    /* Shades a row.
+     * logs     the picture's first logarithm; beyond both ends of a row the outermost are repeated
+     * rgba     [stride] of the row */
+    void (*shade)(const rcpu_light *light, uint32_t y, const int64_t *frame, const float *logs,
+                  uint32_t *rgba);
+} rcpu_kernel;
+
+/* The kernel of that name, or, with NULL, the best that this processor has; NULL: there is none. */
+const rcpu_kernel *rcpu_kernel_find(const char *name);

@@ -1,0 +1,137 @@
+#include "render/cpu/threads.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { THREADS_MAX = 256 };
+
+typedef struct {
+    rcpu_threads *threads;
+    pthread_t thread;
+    uint32_t number;
+} worker;
+
+struct rcpu_threads {
+    uint32_t count;   /* with the caller */
+    worker *workers;  /* [count], owned; the caller is number 0 */
+    uint32_t made;    /* threads to join */
+    atomic_uint next; /* the next job of the round */
+    pthread_mutex_t lock;
+    pthread_cond_t begun, ended;
+    /* Under the lock; what describes a round does not change while `busy` is above 0. */
+    uint64_t round;
+    uint32_t invited, busy; /* workers that shall take part in the round, and are not done */
+    bool stop;
+    uint32_t job_count;
+    rcpu_job *job;
+    void *user;
+};
+
+static void take_jobs(rcpu_threads *t, uint32_t number)
+{
+    for (uint32_t i;
+         (i = atomic_fetch_add_explicit(&t->next, 1, memory_order_relaxed)) < t->job_count;)
+        t->job(t->user, number, i);
+}
+
+static void *work(void *argument)
+{
+    worker *w = argument;
+    rcpu_threads *t = w->threads;
+    pthread_mutex_lock(&t->lock);
+    for (uint64_t seen = 0;;) {
+        while (!t->stop && t->round == seen)
+            pthread_cond_wait(&t->begun, &t->lock);
+        if (t->stop) break;
+        seen = t->round;
+        if (w->number >= t->invited) continue;
+        pthread_mutex_unlock(&t->lock);
+        take_jobs(t, w->number);
+        pthread_mutex_lock(&t->lock);
+        if (--t->busy == 0) pthread_cond_signal(&t->ended);
+    }
+    pthread_mutex_unlock(&t->lock);
+    return NULL;
+}
+
+static uint32_t count_processors(void)
+{
+    cpu_set_t set;
+    int count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+    return (uint32_t)count;
+}
+
+bool rcpu_threads_create(uint32_t count, rcpu_threads **out, mospt_err *err)
+{
+    if (count == 0) count = count_processors();
+    if (count > THREADS_MAX) count = THREADS_MAX;
+    rcpu_threads *t = calloc(1, sizeof *t);
+    worker *workers = calloc(count, sizeof *workers);
+    if (t == NULL || workers == NULL) {
+        free(t), free(workers);
+        return mospt_err_nomem(err, count * sizeof *workers);
+    }
+    t->count = count, t->workers = workers;
+    pthread_mutex_init(&t->lock, NULL);
+    pthread_cond_init(&t->begun, NULL);
+    pthread_cond_init(&t->ended, NULL);
+    for (uint32_t i = 1; i < count; i++) {
+        workers[i] = (worker){.threads = t, .number = i};
+        int failure = pthread_create(&workers[i].thread, NULL, work, &workers[i]);
+        if (failure != 0) {
+            rcpu_threads_destroy(t);
+            return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
+                                 "thread %u of %u cannot be started: %s", i + 1, count,
+                                 strerror(failure));
+        }
+        t->made++;
+    }
+    *out = t;
+    return true;
+}
+
+void rcpu_threads_destroy(rcpu_threads *threads)
+{
+    if (threads == NULL) return;
+    pthread_mutex_lock(&threads->lock);
+    threads->stop = true;
+    pthread_cond_broadcast(&threads->begun);
+    pthread_mutex_unlock(&threads->lock);
+    for (uint32_t i = 1; i <= threads->made; i++)
+        pthread_join(threads->workers[i].thread, NULL);
+    pthread_cond_destroy(&threads->begun);
+    pthread_cond_destroy(&threads->ended);
+    pthread_mutex_destroy(&threads->lock);
+    free(threads->workers);
+    free(threads);
+}
+
+uint32_t rcpu_threads_count(const rcpu_threads *threads)
+{
+    return threads->count;
+}
+
+void rcpu_threads_run(rcpu_threads *threads, uint32_t workers, uint32_t job_count, rcpu_job *job,
+                      void *user)
+{
+    rcpu_threads *t = threads;
+    if (workers == 0 || workers > t->count) workers = t->count;
+    if (workers > job_count) workers = job_count;
+    pthread_mutex_lock(&t->lock);
+    t->job_count = job_count, t->job = job, t->user = user;
+    atomic_store_explicit(&t->next, 0, memory_order_relaxed);
+    if (workers > 1) {
+        t->invited = workers, t->busy = workers - 1;
+        t->round++;
+        pthread_cond_broadcast(&t->begun);
+    }
+    pthread_mutex_unlock(&t->lock);
+    take_jobs(t, 0);
+    pthread_mutex_lock(&t->lock);
+    while (t->busy > 0)
+        pthread_cond_wait(&t->ended, &t->lock);
+    pthread_mutex_unlock(&t->lock);
+}
