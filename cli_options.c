@@ -164,6 +164,11 @@ static bool o_help(cli_options *o, const char *v)
 {
     return (void)v, o->help = true;
 }
+static bool o_no_occlusion(cli_options *o, const char *v)
+{
+    return (void)v, o->limits.no_occlusion = true;
+}
+
 static bool o_no_edl(cli_options *o, const char *v)
 {
     return (void)v, o->look.no_edl = true;
@@ -594,6 +599,8 @@ static const struct {
      "gl, cpu, or auto (default): cpu where OpenGL would draw on the processor too"},
     {"ram-cache", "SIZE", 0, V | S | R, o_ram, "most memory for loaded nodes (default: 1G)"},
     {"gpu-cache", "SIZE", 0, V | S | R, o_gpu, "most graphics memory for nodes (default: 1G)"},
+    {"no-occlusion", NULL, 0, V | S | R, o_no_occlusion,
+     "spend points on nodes that are hidden behind others, too"},
     {"frames", "N", 0, V, o_frames, "close the window after so many frames"},
     {"screenshot", "PATH", 0, V, o_screenshot, "write the window's picture when it closes"},
     {"path", "FILE", 0, V | R, o_path,

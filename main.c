@@ -305,10 +305,11 @@ static void report_shot(const cli_options *o, const rend_shot_result *r)
         return;
     }
     json_t *json = json_pack(
-        "{s:s, s:I, s:o, s:I, s:I, s:b, s:I, s:I, s:f, s:s}", "picture", o->output, "points_drawn",
-        (json_int_t)r->points_drawn, "budget",
+        "{s:s, s:I, s:o, s:I, s:I, s:I, s:I, s:b, s:I, s:I, s:f, s:s}", "picture", o->output,
+        "points_drawn", (json_int_t)r->points_drawn, "budget",
         r->budget_points == REND_ALL ? json_null() : json_integer((json_int_t)r->budget_points),
         "points_in_view", (json_int_t)r->points_in_view, "nodes_drawn", (json_int_t)r->nodes_drawn,
+        "nodes_hidden", (json_int_t)r->nodes_hidden, "points_hidden", (json_int_t)r->points_hidden,
         "budget_spent", (int)r->budget_spent, "loaded_bytes", (json_int_t)r->loaded_bytes,
         "damaged_nodes", (json_int_t)r->damaged_nodes, "ms", r->total_ms, "renderer", r->renderer);
     json_dumpf(json, stdout, JSON_INDENT(2));

@@ -104,6 +104,7 @@ typedef struct {
     uint64_t gpu_cache_bytes; /* 0: REND_GPU_CACHE_DEFAULT */
     float min_node_px;        /* minimum node size: nodes projecting to less are skipped; 0: see
                                  render/select.h */
+    bool no_occlusion;        /* nodes hidden behind others are drawn, too */
 } rend_limits;
 
 /* What draws. */

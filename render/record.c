@@ -134,8 +134,9 @@ static char *describe_job(const recorder *r, rfilm_codec codec)
     fprintf(f, "\"take\": [%u, %.17g, %u, %d, %.17g, %d, %d, %d],\n", t->samples, t->shutter_s,
             t->subframes, (int)t->stereo, t->eye_distance, (int)t->panorama, (int)t->live,
             (int)t->counter);
-    fprintf(f, "\"budget\": %" PRIu64 ", \"node\": %.9g, \"renderer\": %d,\n",
-            t->limits.budget_points, (double)t->limits.min_node_px, (int)t->engine.renderer);
+    fprintf(f, "\"budget\": %" PRIu64 ", \"node\": %.9g, \"hidden\": %d, \"renderer\": %d,\n",
+            t->limits.budget_points, (double)t->limits.min_node_px, (int)t->limits.no_occlusion,
+            (int)t->engine.renderer);
     print_look(f, &t->look);
     fprintf(f, "\"title\": ");
     print_text(f, t->title);

@@ -239,7 +239,7 @@ static bool draw(walk *w, const queued *q, float nearest_px, uint32_t count, mos
     return queue_children(w, q->node, r->draw_count++, err);
 }
 
-typedef enum { SEEN, CULLED, SMALL } sight;
+typedef enum { SEEN, CULLED, SMALL, HIDDEN } sight;
 
 static bool is_clipped(const walk *w, uint32_t node)
 {
@@ -251,8 +251,13 @@ static bool is_clipped(const walk *w, uint32_t node)
 /* Steps 2 and 3. */
 static sight look_at(const walk *w, uint32_t node, const placed *p, float nearest_px)
 {
+    const mospt_node *n = &w->in->hierarchy->nodes[node];
     if (is_outside(w->in->frame, p) || is_clipped(w, node)) return CULLED;
-    return node != 0 && nearest_px < w->min_node_px ? SMALL : SEEN;
+    if (node != 0 && nearest_px < w->min_node_px) return SMALL;
+    bool hidden =
+        w->in->occlusion != NULL &&
+        rend_occlusion_hides(w->in->occlusion, n->corner, mospt_cell_width(w->in->grid, n->level));
+    return hidden ? HIDDEN : SEEN;
 }
 
 /* The four steps. */
@@ -278,6 +283,7 @@ static bool visit(walk *w, const queued *q, mospt_err *err)
     }
     sight seen = look_at(w, q->node, &p, nearest_px);
     r->culled += seen == CULLED, r->small += seen == SMALL;
+    r->hidden += seen == HIDDEN, r->points_hidden += seen == HIDDEN ? count : 0;
     if (seen != SEEN) return true;
     w->pages += pages;
     r->points_in_view += n->count;

@@ -6,6 +6,7 @@
  *   1. Would its points exceed the budget? Then the traversal stops.
  *   2. Is it outside the view frustum, or of the clip box? Then it is skipped, with all below it.
  *   3. Is its lowest level too small? Then it is skipped, with all below it.
+ *      Or hidden behind what is drawn (render/occlusion.h)? Then, too: the paper's future work.
  *   4. Is it resident? Then it is put on the draw list and its children on the queue. Else it is
  *      requested and skipped.
  *
@@ -32,8 +33,8 @@
  * frame. */
 #pragma once
 #include "mospt/linear.h"
-#include "render/camera.h"
 #include "render/clip.h"
+#include "render/occlusion.h"
 
 typedef enum {
     REND_ABSENT = 0,
@@ -46,6 +47,7 @@ typedef struct {
     const mospt_hierarchy *hierarchy;
     const mospt_grid *grid;
     const rend_frame *frame;
+    const rend_occlusion *occlusion; /* aimed at the frame; NULL: nothing is hidden */
     const uint8_t *residency; /* [hierarchy->count] rend_residency; NULL: everything is resident */
     uint64_t budget_points;   /* 0: nothing; REND_ALL: no limit */
     float min_node_px;        /* 0: 2^(d-1), see above */
@@ -87,7 +89,9 @@ typedef struct {
     uint64_t points;                 /* sum of the counts of all draws */
     uint64_t points_in_view;         /* of all nodes that passed steps 1 to 3, all their points */
     uint32_t visited, culled, small; /* nodes popped; skipped in step 2; in step 3 */
-    bool stopped;                    /* in step 1: the budget is spent */
+    uint32_t hidden;                 /* nodes skipped behind what is drawn */
+    uint64_t points_hidden; /* what would have been drawn of them; not of those below them */
+    bool stopped;           /* in step 1: the budget is spent */
 } rend_selection;
 
 typedef struct rend_selector rend_selector; /* the workspace */

@@ -32,6 +32,8 @@ static bool draw(const mospt_dataset *dataset, rgl *gl, const rend_shot_options 
             .budget_points = view->budget_points,
             .points_in_view = figures.points_in_view,
             .nodes_drawn = figures.nodes_drawn,
+            .nodes_hidden = figures.nodes_hidden,
+            .points_hidden = figures.points_hidden,
             .budget_spent = figures.budget_spent,
             .loaded_bytes = figures.loaded_bytes,
             .draw_ms = now_ms() - start,
@@ -55,6 +57,7 @@ static bool make_view(const mospt_dataset *dataset, const rend_shot_options *opt
         .budget_points =
             options->limits.budget_points > 0 ? options->limits.budget_points : REND_ALL,
         .min_node_px = options->limits.min_node_px,
+        .no_occlusion = options->limits.no_occlusion,
     };
     if (view.width > REND_SIZE_MAX || view.height > REND_SIZE_MAX)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),

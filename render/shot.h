@@ -18,7 +18,8 @@ typedef struct {
 
 typedef struct {
     uint64_t points_drawn, budget_points, points_in_view;
-    uint32_t nodes_drawn;
+    uint32_t nodes_drawn, nodes_hidden; /* hidden: see rend_figures */
+    uint64_t points_hidden;
     bool budget_spent;
     uint64_t loaded_bytes;
     double total_ms, draw_ms; /* all of it; from the selection to the last pixel */

@@ -19,6 +19,9 @@ enum {
 enum { GROUP_SMALLEST, GROUP_SMALL, GROUP_WIDE, GROUPS };
 /* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
 #define UPLOAD_BYTES_PER_FRAME (64 * REND_MIB)
+/* Fewer points than that are not worth a look at what they hide. */
+#define OCCLUSION_POINTS_MIN 200000
+#define OCCLUDER_SHARE 2 /* of the budget, for what hides */
 #define WAITING_BYTES_MAX (128 * REND_MIB)
 /* Points of neighbouring cells are up to two cells apart: splats this much wider than a cell leave
  * few holes. */
@@ -61,8 +64,7 @@ struct rend_stage {
     rend_frame frame;
     rend_clip clip; /* of the selection, if the view has one */
     rend_figures figures;
-    bool has_expected; /* the selection is that of `expected`, with all nodes */
-    rend_view_of expected;
+    rend_occlusion *occlusion;
 };
 
 static void evict_vertices(void *user, uint32_t node, void *value)
@@ -127,11 +129,13 @@ static bool make_caches(rend_stage *s, const rend_limits *limits, rend_loader_wa
     s->gpu_paint = calloc((size_t)nodes + 1, sizeof *s->gpu_paint);
     s->scheme = rend_scheme_create(s->dataset);
     s->selector = rend_select_create();
+    s->occlusion = rend_occlusion_create();
     s->pages = rend_pages_create(s->page_count);
     s->ram = rend_cache_create(nodes, ram, evict_vertices, s);
     s->gpu = rend_cache_create(nodes, gpu, evict_place, s);
     if (s->residency == NULL || s->wanted == NULL || s->gpu_paint == NULL || s->scheme == NULL ||
-        s->selector == NULL || s->pages == NULL || s->ram == NULL || s->gpu == NULL)
+        s->selector == NULL || s->occlusion == NULL || s->pages == NULL || s->ram == NULL ||
+        s->gpu == NULL)
         return mospt_err_nomem(err, (size_t)nodes * 64);
     if (!rgl_arena_create(s->gl, (uint64_t)s->page_count * PAGE_POINTS, err)) return false;
     uint64_t waiting = ram < WAITING_BYTES_MAX ? ram : WAITING_BYTES_MAX;
@@ -161,6 +165,7 @@ void rend_stage_destroy(rend_stage *stage)
     rend_cache_destroy(stage->gpu);
     rend_pages_destroy(stage->pages);
     rend_select_destroy(stage->selector);
+    rend_occlusion_destroy(stage->occlusion);
     rend_scheme_destroy(stage->scheme);
     free(stage->attribute);
     free(stage->gpu_paint);
@@ -460,30 +465,44 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
     return scene;
 }
 
-static bool select_view(rend_stage *s, const rend_view_of *view, bool everything, mospt_err *err)
+/* What a selection starts from, with nothing hidden. */
+static rend_select_input input_of(rend_stage *s, const rend_view_of *view)
 {
-    s->has_expected = false;
     rend_frame_make(&view->camera, &s->dataset->metadata.grid, s->bounds_low, s->bounds_high,
                     view->width, view->height, &s->frame);
     if (view->look.has_clip) rend_clip_make(&s->dataset->metadata.grid, &view->look.clip, &s->clip);
-    rend_select_input input = {
-        .hierarchy = &s->dataset->hierarchy,
-        .grid = &s->dataset->metadata.grid,
-        .frame = &s->frame,
-        .residency = everything ? NULL : s->residency,
-        .budget_points = view->budget_points,
-        .min_node_px = view->min_node_px,
-        .page_limit = everything ? 0 : s->page_count,
-        .page_points = PAGE_POINTS,
-        .clip = view->look.has_clip ? &s->clip : NULL,
-    };
-    if (!rend_select_run(s->selector, &input, &s->selection, err)) return false;
+    return (rend_select_input){.hierarchy = &s->dataset->hierarchy,
+                               .grid = &s->dataset->metadata.grid,
+                               .frame = &s->frame,
+                               .budget_points = view->budget_points,
+                               .min_node_px = view->min_node_px,
+                               .page_points = PAGE_POINTS,
+                               .clip = view->look.has_clip ? &s->clip : NULL};
+}
+
+static bool run_selection(rend_stage *s, const rend_view_of *view, const rend_select_input *input,
+                          mospt_err *err)
+{
+    if (!rend_select_run(s->selector, input, &s->selection, err)) return false;
     s->figures.points_drawn = 0;
     s->figures.nodes_drawn = 0;
     s->figures.points_in_view = s->selection->points_in_view;
     s->figures.nodes_visited = s->selection->visited;
+    s->figures.nodes_hidden = s->selection->hidden;
+    s->figures.points_hidden = s->selection->points_hidden;
     s->figures.budget_spent = s->selection->stopped;
     return sort_draws(s, view, err);
+}
+
+/* The depths of what has been drawn are what things can be hidden behind. Without memory for them
+ * nothing is. */
+static bool learn_occlusion(rend_stage *s, mospt_err *err)
+{
+    float *depths = rend_occlusion_depths(s->occlusion, s->frame.width, s->frame.height);
+    if (depths == NULL) return true;
+    if (!rgl_read_depths(s->gl, depths, err)) return false;
+    rend_occlusion_learn(s->occlusion, &s->frame);
+    return true;
 }
 
 /* ---- a frame in a window ---- */
@@ -544,12 +563,20 @@ static bool fetch(rend_stage *s, rend_progress *progress, mospt_err *err)
     return rend_loader_request(s->loader, s->wanted, wanted, err);
 }
 
+static bool select_frame(rend_stage *s, const rend_view_of *view, mospt_err *err)
+{
+    rend_select_input input = input_of(s, view);
+    input.residency = s->residency;
+    input.page_limit = s->page_count;
+    return run_selection(s, view, &input, err);
+}
+
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
                       mospt_err *err)
 {
     if (!use_colours(stage, &view->look, err)) return false;
     take_loaded(stage);
-    if (!select_view(stage, view, false, err)) return false;
+    if (!select_frame(stage, view, err)) return false;
     unpin_all(stage);
     for (uint32_t i = 0; i < stage->selection->draw_count; i++)
         if (!pin(stage, stage->selection->draws[i].node, err)) return false;
@@ -625,17 +652,14 @@ static bool bring(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
     return rend_loader_request(s->loader, s->wanted, wanted, err) && wait_for(s, wanted, err);
 }
 
-static bool is_expected(const rend_stage *s, const rend_view_of *view)
-{
-    return s->has_expected && memcmp(&s->expected, view, sizeof *view) == 0;
-}
-
 bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
     uint32_t wanted = 0;
-    if (!use_colours(stage, &view->look, err) || !select_view(stage, view, true, err)) return false;
-    stage->has_expected = true;
-    stage->expected = *view;
+    rend_select_input input = input_of(stage, view);
+    input.occlusion = stage->occlusion; /* of the picture before: a guess, good enough to read by */
+    rend_occlusion_aim(stage->occlusion, &stage->frame);
+    if (!use_colours(stage, &view->look, err) || !run_selection(stage, view, &input, err))
+        return false;
     /* What takes several parts has no room for anything that is read early. */
     if (end_of_chunk(stage, 0) < stage->selection->draw_count) return true;
     for (uint32_t i = 0; i < stage->selection->draw_count; i++) {
@@ -646,7 +670,7 @@ bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *e
     return rend_loader_request(stage->loader, stage->wanted, wanted, err);
 }
 
-/* Draws everything through the GPU cache, in as many parts as that needs.
+/* Draws the selection through the GPU cache, in as many parts as that needs.
  * first, last  flags for the first and the last of them, besides those for all */
 static bool draw_all(rend_stage *s, const rend_view_of *view, int first, int all, int last,
                      mospt_err *err)
@@ -662,25 +686,44 @@ static bool draw_all(rend_stage *s, const rend_view_of *view, int first, int all
         if (!rgl_draw(s->gl, &scene, s->batches, s->batch_count, parts, err)) return false;
         from = to;
     } while (from < total);
+    unpin_all(s);
     return true;
+}
+
+/* Few points are drawn sooner than depths are read back. */
+static bool may_hide(const rend_stage *s, const rend_view_of *view)
+{
+    return !view->no_occlusion &&
+           (s->selection->stopped || s->selection->points > OCCLUSION_POINTS_MIN);
+}
+
+/* What the picture will look like, from a part of its points: with cells twice as wide, where
+ * splats are, too. */
+static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *err)
+{
+    rend_select_input input = input_of(s, view);
+    if (view->budget_points != REND_ALL) input.budget_points /= OCCLUDER_SHARE;
+    if (view->look.size_mode == REND_SIZE_AUTO) input.cell_px = 2;
+    return run_selection(s, view, &input, err) && draw_all(s, view, RGL_BEGIN, 0, 0, err) &&
+           learn_occlusion(s, err);
 }
 
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
-    if (!is_expected(stage, view) &&
-        (!use_colours(stage, &view->look, err) || !select_view(stage, view, true, err)))
-        return false;
-    stage->has_expected = false;
-    bool blend = view->look.blend_slab > 0;
-    bool ok;
-    if (blend && end_of_chunk(stage, 0) < stage->selection->draw_count)
-        ok = draw_all(stage, view, RGL_BEGIN, view->parts, 0, err) &&
-             draw_all(stage, view, 0, view->parts | RGL_AGAIN, RGL_END, err);
-    else ok = draw_all(stage, view, RGL_BEGIN | (blend ? RGL_AGAIN : 0), view->parts, RGL_END, err);
-    if (!ok) return false;
-    unpin_all(stage);
+    if (!use_colours(stage, &view->look, err)) return false;
+    rend_select_input input = input_of(stage, view);
+    if (!run_selection(stage, view, &input, err)) return false;
+    if (may_hide(stage, view)) {
+        if (!draw_occluders(stage, view, err)) return false;
+        input.occlusion = stage->occlusion;
+        if (!run_selection(stage, view, &input, err)) return false;
+    }
     stage->figures.pending = 0;
-    return true;
+    bool blend = view->look.blend_slab > 0;
+    if (blend && end_of_chunk(stage, 0) < stage->selection->draw_count)
+        return draw_all(stage, view, RGL_BEGIN, view->parts, 0, err) &&
+               draw_all(stage, view, 0, view->parts | RGL_AGAIN, RGL_END, err);
+    return draw_all(stage, view, RGL_BEGIN | (blend ? RGL_AGAIN : 0), view->parts, RGL_END, err);
 }
 
 void rend_stage_figures(rend_stage *stage, rend_figures *out)

@@ -23,6 +23,7 @@ typedef struct {
     rend_look look;
     uint64_t budget_points; /* REND_ALL: no limit */
     float min_node_px;      /* 0: see render/select.h */
+    bool no_occlusion;      /* nodes hidden behind others are drawn, too */
     int parts;              /* RGL_TO_WINDOW or 0 */
 } rend_view_of;
 
@@ -30,6 +31,8 @@ typedef struct {
     uint64_t points_drawn, points_in_view; /* in view: all points of the nodes that a higher budget
                                               would not reject first */
     uint32_t nodes_drawn, nodes_visited;
+    uint32_t nodes_hidden;  /* left out behind others, with all below them */
+    uint64_t points_hidden; /* what would have been drawn of these, without what is below */
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
     uint64_t loaded_bytes;                             /* since the start */
@@ -62,9 +65,8 @@ typedef enum {
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
                       mospt_err *err);
 
-/* Says which picture is wanted next: selects for it, and has the loader read what it misses while
- * the one before is being drawn. Figures are those of the expected picture from now on;
- * rend_stage_still() of the same view goes on from there. */
+/* Says which picture is wanted next: has the loader read what it will probably miss while the one
+ * before is being drawn. Figures are those of a guess at it from now on. */
 bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *err);
 
 /* Draws all that the budget allows, reading it through the caches in as many parts as they need. */

@@ -196,6 +196,7 @@ bool rend_take_view(const rend_take *take, const rend_curve *curve, double time_
     if (moment.has_clip) out->look.has_clip = true, out->look.clip = moment.clip;
     out->budget_points = budget == REND_ALL ? REND_ALL : budget / take->views;
     out->min_node_px = o->limits.min_node_px;
+    out->no_occlusion = o->limits.no_occlusion;
     if (o->panorama) {
         rend_panorama_camera(&take->panorama, &moment.camera, view, &out->camera);
         flatten_background(&out->look);

@@ -1,5 +1,5 @@
-/* scripts/make_site.c - scans of a small ruin that does not exist, as a laser scanner on a tripod
- * would write them.
+/* scripts/make_site.c - scans of a small ruin that does not exist, or of a house of many rooms, as
+ * a laser scanner on a tripod would write them.
  *
  * Each scan is a grid of angles seen from one place: dense nearby, thin far away, empty behind what
  * stands in the way, below the tripod and in the sky. One LAS 1.2 file per scan, point format 2.
@@ -12,6 +12,7 @@
 
 #include "mospt/err.h"
 #include "scripts/site_paint.h"
+#include "scripts/site_rooms.h"
 #include "scripts/site_scene.h"
 
 static const double pi = 3.14159265358979;
@@ -28,6 +29,7 @@ typedef struct {
     double point_count; /* of all scans */
     double origin[3];   /* world coordinates of the site's origin */
     uint32_t seed;
+    uint32_t rooms; /* along each side of a house; 0: the ruin */
 } options;
 
 typedef struct {
@@ -314,7 +316,9 @@ static bool make_site(const options *o, mospt_err *err)
     site_scene scene;
     bool ok = false;
     if (!make_folder(o->folder, err)) return false;
-    if (!site_scene_init(&scene, o->seed, err)) return false;
+    if (o->rooms > 0 ? !site_rooms_init(&scene, o->rooms, o->seed, err)
+                     : !site_scene_init(&scene, o->seed, err))
+        return false;
     uint64_t total = 0;
     for (int i = 0, place = 0; i < o->scan_count; i++) {
         char path[4096];
@@ -322,7 +326,8 @@ static bool make_site(const options *o, mospt_err *err)
         scanner s = {.scene = &scene, .number = i + 1, .seed = o->seed};
         s.sun = site_unit(site_v(-0.62f, -0.75f, 0.78f));
         do
-            s.at = position(place++);
+            s.at = o->rooms > 0 ? site_rooms_position(o->rooms, (uint32_t)place++, tripod_m)
+                                : position(place++);
         while (!has_room(&scene, s.at) && place < 100000);
         uint64_t count = 0;
         if (!write_scan(&s, o, path, &count, err)) goto done;
@@ -366,6 +371,11 @@ static bool parse_option(options *o, const char *name, const char *value)
         o->scan_count = (int)number;
         return true;
     }
+    if (strcmp(name, "--rooms") == 0) {
+        if (!parse_number(value, 1, 100, &number)) return false;
+        o->rooms = (uint32_t)number;
+        return true;
+    }
     if (strcmp(name, "--seed") != 0 || !parse_number(value, 0, UINT32_MAX, &number)) return false;
     o->seed = (uint32_t)number;
     return true;
@@ -386,7 +396,9 @@ int main(int argc, char **argv)
     }
     if (!ok || o.folder == NULL) {
         fprintf(stderr,
-                "usage: make_site FOLDER [--scans N] [--points N] [--origin X,Y,Z] [--seed N]\n"
+                "usage: make_site FOLDER [--scans N] [--points N] [--origin X,Y,Z] [--seed N] "
+                "[--rooms N]\n"
+                "--rooms: a house of N x N rooms on two floors instead of a ruin.\n"
                 "Writes FOLDER/scan_01.las and so on: 4 scans with 2e6 points together, unless "
                 "told otherwise.\n");
         return 2;

@@ -139,6 +139,51 @@ static void the_same_options_give_the_same_bytes(void **unused)
     render_site_fini(&site);
 }
 
+static uint8_t *read_rgb(const render_site *site, const char *name)
+{
+    char *path = core_path(site->folder, "%s", name);
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    uint8_t *rgb = malloc(PNG_IMAGE_SIZE(image));
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    free(path);
+    return rgb;
+}
+
+/* Seen from the middle of one of many rooms. */
+static void what_is_hidden_does_not_show_and_is_not_drawn(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result all, seen;
+    uint32_t differ = 0;
+    render_rooms_make(1500000, &site);
+    const mospt_metadata *m = &site.dataset->metadata;
+    rend_shot_options o = {.camera = {.has_eye = true, .has_target = true}};
+    for (int a = 0; a < 3; a++)
+        o.camera.eye[a] = m->low[a] + (a < 2 ? 20 : 4), o.camera.target[a] = o.camera.eye[a];
+    o.camera.target[0] += 10, o.camera.target[1] += 4;
+    take(&site, "seen.png", o, &seen);
+    o.limits.no_occlusion = true;
+    take(&site, "all.png", o, &all);
+    assert_int_equal(all.nodes_hidden, 0);
+    assert_true(seen.nodes_hidden > 10 && seen.points_hidden > 1000);
+    assert_true(seen.points_drawn < all.points_drawn * 4 / 10);
+    uint8_t *a = read_rgb(&site, "seen.png"), *b = read_rgb(&site, "all.png");
+    for (size_t i = 0; i < PIXELS; i++)
+        for (size_t c = 0, done = 0; c < 3 && !done; c++)
+            if (abs(a[3 * i + c] - b[3 * i + c]) > 2) differ++, done = 1;
+    assert_true(differ <= PIXELS / 50); /* seen through the gaps of walls made of random points */
+    o.limits = (rend_limits){.gpu_cache_bytes = 1, .ram_cache_bytes = 1};
+    take(&site, "small.png", o, &all);
+    assert_int_equal(all.points_drawn, seen.points_drawn);
+    assert_same_picture(&site, "seen.png", &site, "small.png");
+    free(a);
+    free(b);
+    render_site_fini(&site);
+}
+
 static void cache_sizes_do_not_show(void **unused)
 {
     (void)unused;
@@ -280,6 +325,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(seen_from_inside_not_a_pixel_is_missing),
         cmocka_unit_test(a_clip_box_cuts_exactly),
         cmocka_unit_test(the_same_options_give_the_same_bytes),
+        cmocka_unit_test(what_is_hidden_does_not_show_and_is_not_drawn),
         cmocka_unit_test(cache_sizes_do_not_show),
         cmocka_unit_test(a_site_does_not_shake_at_utm_coordinates),
         cmocka_unit_test(every_look_can_be_drawn),

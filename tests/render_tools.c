@@ -79,17 +79,40 @@ void render_frame_make(const rend_camera *camera, const mospt_grid *grid, rend_f
     rend_frame_make(camera, grid, grid->root, high, 640, 360, out);
 }
 
-void render_site_make(core_kind kind, uint32_t count, const int64_t shift[3], render_site *out)
+/* Builds what is in `site`. */
+static void build(render_site *site, uint32_t count)
 {
     mospt_err err = {0};
-    *out = (render_site){.folder = core_folder_make()};
-    out->path = core_path(out->folder, "site.ipts");
+    site->folder = core_folder_make();
+    site->path = core_path(site->folder, "site.ipts");
+    core_dataset_make(&site->site, 4, 50, site->path);
+    CORE_NEED(mospt_dataset_open(site->path, &site->dataset, &err));
+    assert_true(site->dataset->hierarchy.count > 4 || count < 1000);
+}
+
+void render_site_make(core_kind kind, uint32_t count, const int64_t shift[3], render_site *out)
+{
+    *out = (render_site){0};
     core_site_make(kind, 16, count, 7, &out->site);
     for (int a = 0; a < 3 && shift != NULL; a++)
         out->site.grid.base[a] += shift[a];
-    core_dataset_make(&out->site, 4, 50, out->path);
-    CORE_NEED(mospt_dataset_open(out->path, &out->dataset, &err));
-    assert_true(out->dataset->hierarchy.count > 4 || count < 1000);
+    build(out, count);
+}
+
+void render_rooms_make(uint32_t count, render_site *out)
+{
+    enum { ROOM = 1 << 13 };
+    *out = (render_site){0};
+    core_site_make(CORE_UNIFORM, 16, count, 7, &out->site);
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t g[3], *axis = &g[i % 2]; /* of walls across x, and across y */
+        uint8_t *record = out->site.records + i * out->site.stride;
+        memcpy(g, record, sizeof g);
+        *axis = *axis / ROOM * ROOM;
+        g[2] = out->site.grid.root[2] + g[2] % ROOM;
+        memcpy(record, g, sizeof g);
+    }
+    build(out, count);
 }
 
 void render_site_fini(render_site *site)

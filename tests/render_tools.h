@@ -27,6 +27,8 @@ typedef struct {
 } render_site;
 
 void render_site_make(core_kind kind, uint32_t count, const int64_t shift[3], render_site *out);
+/* Walls that make 8 x 8 closed rooms, 65.536 m all together, each as high as wide. */
+void render_rooms_make(uint32_t count, render_site *out);
 void render_site_fini(render_site *site);
 
 /* Changes one byte of the first vertex of a node on disk. */

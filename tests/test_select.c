@@ -366,6 +366,37 @@ static void the_same_frame_is_selected_alike(void **unused)
     stop(&g);
 }
 
+/* A wall in front of everything: only what reaches up to it, or stands around the eye, is drawn. */
+static void hidden_nodes_are_skipped_and_counted(void **unused)
+{
+    (void)unused;
+    fixture f;
+    rend_frame frame;
+    start(&f, 16, 5, 3000, 11);
+    rend_camera camera = overview(&f.grid);
+    render_frame_make(&camera, &f.grid, &frame);
+    rend_select_input in = input_for(&f, &frame, REND_ALL);
+    uint32_t all = run(&f, &in)->draw_count;
+    rend_occlusion *occlusion = rend_occlusion_create();
+    float *depths = rend_occlusion_depths(occlusion, frame.width, frame.height);
+    assert_non_null(depths);
+    for (uint32_t i = 0; i < frame.width * frame.height; i++)
+        depths[i] = i % frame.width < frame.width / 2 ? 0 : 1;
+    rend_occlusion_learn(occlusion, &frame);
+    in.occlusion = occlusion;
+    const rend_selection *s = run(&f, &in);
+    assert_true(s->draw_count < all && s->draw_count > 1 && s->hidden > 0 && s->points_hidden > 0);
+    for (uint32_t i = 0; i < s->draw_count; i++) {
+        const mospt_node *n = &f.tree.nodes[s->draws[i].node];
+        assert_false(
+            rend_occlusion_hides(occlusion, n->corner, mospt_cell_width(&f.grid, n->level)));
+    }
+    rend_occlusion_forget(occlusion);
+    assert_int_equal(run(&f, &in)->draw_count, all);
+    rend_occlusion_destroy(occlusion);
+    stop(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -379,6 +410,7 @@ int main(void)
         cmocka_unit_test(a_missing_child_leaves_no_gap),
         cmocka_unit_test(a_damaged_node_does_not_hide_what_is_below),
         cmocka_unit_test(the_same_frame_is_selected_alike),
+        cmocka_unit_test(hidden_nodes_are_skipped_and_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
