@@ -7,7 +7,7 @@
 enum { CELLS_MAX = 16 << 20, FILLED_POINTS = 2 };
 #define CELL_MIN_M 0.25
 #define POINTS_MAX UINT64_C(40000000)
-#define COST_SOLID 100.0f
+#define COST_SOLID 10000.0f /* more than any way around */
 #define COST_NO_FLOOR 20.0f
 #define COST_NARROW 3.0f
 #define COST_PER_M 10.0f /* up or down: a way around is better than a jump */

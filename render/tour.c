@@ -234,6 +234,11 @@ static bool walk(const rend_space *space, const places *stops, places *way, mosp
     return true;
 }
 
+static float cost_at(const rend_space *space, const double at[3])
+{
+    return rend_space_cost(space, rend_space_cell(space, at), EYE_M);
+}
+
 /* The mean of the points around one. */
 static void mean_of(const places *way, size_t from, size_t to, double out[3])
 {
@@ -253,13 +258,12 @@ static bool smooth(const rend_space *space, places *way, mospt_err *err)
     if (means == NULL) return mospt_err_nomem(err, way->count * sizeof *means);
     for (size_t i = 0; i < way->count; i++) {
         size_t r = reach;
-        float cost = rend_space_cost(space, rend_space_cell(space, way->at[i]), EYE_M);
+        float cost = cost_at(space, way->at[i]);
         if (i < r) r = i;
         if (way->count - 1 - i < r) r = way->count - 1 - i;
         do
             mean_of(way, i - r, i + r, means[i]);
-        while (rend_space_cost(space, rend_space_cell(space, means[i]), EYE_M) > cost + 3 &&
-               r-- > 0);
+        while (cost_at(space, means[i]) > cost + 1 && r-- > 0);
     }
     free(way->at);
     way->at = means;
@@ -277,7 +281,33 @@ static size_t ahead(const places *way, size_t from, double metres)
     return i;
 }
 
-static bool make_keys(const places *way, rend_path *path, mospt_err *err)
+/* True if the straight line from point to point is as free as the way between them. */
+static bool is_as_free(const rend_space *space, const places *way, size_t from, size_t to)
+{
+    const double *a = way->at[from], *b = way->at[to];
+    float most = 0;
+    for (size_t i = from; i <= to; i++)
+        most = fmaxf(most, cost_at(space, way->at[i]));
+    uint32_t steps = (uint32_t)(2 * distance3(a, b) / space->cell_m) + 1;
+    for (uint32_t s = 1; s < steps; s++) {
+        double at[3];
+        for (int x = 0; x < 3; x++)
+            at[x] = a[x] + (b[x] - a[x]) * s / steps;
+        if (cost_at(space, at) > most + 1) return false;
+    }
+    return true;
+}
+
+/* Where the next keyframe is: nearer where the curve would cut a corner. */
+static size_t next_key(const rend_space *space, const places *way, size_t from)
+{
+    size_t next = ahead(way, from, KEY_M);
+    while (next > from + 1 && !is_as_free(space, way, from, next))
+        next = from + (next - from) / 2;
+    return next;
+}
+
+static bool make_keys(const rend_space *space, const places *way, rend_path *path, mospt_err *err)
 {
     double gone = 0, towards[3] = {1, 0, 0};
     for (size_t i = 0, next; i < way->count; i = next) {
@@ -294,7 +324,7 @@ static bool make_keys(const places *way, rend_path *path, mospt_err *err)
         for (int a = 0; a < 3; a++)
             key.camera.target[a] = key.camera.eye[a] + towards[a];
         if (!rend_path_add(path, &key, NULL, err)) return false;
-        next = ahead(way, i, KEY_M);
+        next = next_key(space, way, i);
         if (next == i) break;
         for (size_t j = i; j < next; j++)
             gone += distance3(way->at[j], way->at[j + 1]);
@@ -358,7 +388,7 @@ static bool make_walk(const mospt_dataset *dataset, rend_path *path, mospt_err *
             err, MOSPT_EINVAL, mospt_nowhere(),
             "there is no free way to walk through this site; --orbit turns around it");
     ok = ok && walk(&space, &stops, &way, err) && smooth(&space, &way, err) &&
-         make_keys(&way, path, err);
+         make_keys(&space, &way, path, err);
     free(stops.at), free(way.at);
     rend_space_fini(&space);
     return ok;
