@@ -350,6 +350,8 @@ static int command_record(const cli_options *o)
     rend_record_result result = {0};
     if (o->path_count == 0) return misuse(o->command, "of what?");
     if (o->output == NULL) return misuse(o->command, "where to? -o FILM.mp4 says it");
+    if ((o->camera_path != NULL) + o->film.tour + o->film.orbit > 1)
+        return misuse(o->command, "which of --path, --tour and --orbit?");
     bool ok = place_open(o, NULL, &p, &err) && cli_record(o, p.dataset, should_stop, &result, &err);
     if (ok) {
         cli_record_report(o, &result);

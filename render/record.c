@@ -340,9 +340,20 @@ static bool colours_fit(const recorder *r, mospt_err *err)
     return ok;
 }
 
+/* Before hours of drawing, too. */
+static bool can_report(const recorder *r, mospt_err *err)
+{
+    FILE *f = r->options.report != NULL ? fopen(r->options.report, "a") : NULL;
+    if (f != NULL) fclose(f);
+    return f != NULL || r->options.report == NULL ||
+           mospt_err_set(err, MOSPT_EIO, mospt_at_file(r->options.report), "cannot be written");
+}
+
 static bool start(recorder *r, mospt_err *err)
 {
-    if (!set_defaults(r, err) || !colours_fit(r, err)) return false;
+    if (!set_defaults(r, err) || !rend_take_fits(&r->options.take, err) || !colours_fit(r, err) ||
+        !can_report(r, err))
+        return false;
     return rend_curve_create(r->options.path, &r->curve, err) && open_reel(r, err);
 }
 

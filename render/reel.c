@@ -241,6 +241,7 @@ bool rend_reel_open(const rend_reel_options *options, rend_reel **out, mospt_err
     r->pictures = rend_reel_is_pictures(options->path);
     r->folder = make_name("%s.part", options->path);
     bool ok = r->folder != NULL || mospt_err_nomem(err, 0);
+    ok = ok && (r->pictures || rfilm_options_fit(&options->film, options->path, err));
     ok = ok && open_job(r, err) && open_notes(r, err) &&
          (r->pictures ? skip_pictures(r, err) : skip_whole_segments(r, err));
     if (ok && !r->pictures && r->next < options->end) ok = begin_segment(r, err);

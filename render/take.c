@@ -47,7 +47,7 @@ static bool has_words(const rend_take_options *o)
     return o->counter || (o->title != NULL && o->title[0] != '\0');
 }
 
-static bool check(const rend_take_options *o, mospt_err *err)
+bool rend_take_fits(const rend_take_options *o, mospt_err *err)
 {
     uint64_t samples = o->samples > 0 ? o->samples : 1;
     const char *fault = NULL;
@@ -105,7 +105,7 @@ static void scale_look(rend_take *t)
 bool rend_take_create(const mospt_dataset *dataset, const rend_take_options *options,
                       rend_take **out, mospt_err *err)
 {
-    if (!check(options, err)) return false;
+    if (!rend_take_fits(options, err)) return false;
     rend_take *t = calloc(1, sizeof *t);
     if (t == NULL) return mospt_err_nomem(err, sizeof *t);
     t->dataset = dataset;

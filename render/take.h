@@ -56,6 +56,10 @@ typedef struct {
 
 typedef struct rend_take rend_take;
 
+/* What can be known before anything is made.
+ * errors   MOSPT_EINVAL */
+bool rend_take_fits(const rend_take_options *options, mospt_err *err);
+
 /* Opens an engine of its own.
  * dataset, options   borrowed
  * errors   MOSPT_EINVAL (options), MOSPT_EIO (no driver), MOSPT_ENOMEM */

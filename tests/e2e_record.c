@@ -478,8 +478,9 @@ static void what_makes_no_sense_is_refused(void **unused)
     scene s;
     mospt_err err = {0};
     scene_make(&s);
-    char *path = core_path(s.site.folder, "a.mp4"), *doc = core_path(s.site.folder, "a.doc");
-    for (int fault = 0; fault < 10; fault++) {
+    char *path = core_path(s.site.folder, "a.mp4"), *doc = core_path(s.site.folder, "a.doc"),
+         *part = core_path(s.site.folder, "a.mp4.part");
+    for (int fault = 0; fault < 12; fault++) {
         rend_path none = {0};
         rend_record_options options = options_for(&s.path, path);
         if (fault == 0) options.output = doc;
@@ -492,10 +493,13 @@ static void what_makes_no_sense_is_refused(void **unused)
         if (fault == 7) options.take.width = 20000;
         if (fault == 8) options.has_quality = true, options.quality = 60;
         if (fault == 9) options.take.samples = 99;
-        CORE_FAILS(rend_record(s.site.dataset, &options, NULL, &err), MOSPT_EINVAL);
-        assert_false(core_exists(path));
+        if (fault == 10) options.take.bits = 16; /* H.264 has 8 */
+        if (fault == 11) options.report = "/no/such/folder/report.json";
+        CORE_FAILS(rend_record(s.site.dataset, &options, NULL, &err),
+                   fault == 11 ? MOSPT_EIO : MOSPT_EINVAL);
+        assert_false(core_exists(path) || core_exists(part)); /* nothing that is in the way later */
     }
-    free(path), free(doc);
+    free(path), free(doc), free(part);
     scene_fini(&s);
 }
 

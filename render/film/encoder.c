@@ -56,16 +56,21 @@ bool rfilm_codec_for(const char *path, const char *wanted, rfilm_codec *out, mos
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path), "%s films do not take %.40s",
                              dot, wanted);
     }
-    return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
-                         "the name of a film ends in .mp4, .webm or .mkv");
+    return mospt_err_set(
+        err, MOSPT_EINVAL, mospt_at_file(path),
+        "the name of a film ends in .mp4, .webm or .mkv, that of pictures in .png");
 }
 
-static bool check(const rfilm_options *o, const char *path, mospt_err *err)
+bool rfilm_options_fit(const rfilm_options *o, const char *path, mospt_err *err)
 {
     if (CODECS[o->codec].halves_colours && (o->width % 2 != 0 || o->height % 2 != 0))
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
                              "%s films have even sizes, %u x %u is not", CODECS[o->codec].name,
                              o->width, o->height);
+    if (o->bits == 16 && o->codec != RFILM_FFV1)
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
+                             "%s films have 8 bits; .mkv films and .png pictures may have 16",
+                             CODECS[o->codec].name);
     if (o->has_quality && o->quality > CODECS[o->codec].quality_max)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_at_file(path),
                              "the quality of %s films goes from 0 to %u", CODECS[o->codec].name,
@@ -105,7 +110,10 @@ static void set_codec_options(AVCodecContext *c, const rfilm_options *o)
      * processors.
      */
     if (o->codec == RFILM_H264)
-        libav.av_opt_set(c->priv_data, "x264-params", "cpu-independent=1:rc-lookahead=12", 0);
+        libav.av_opt_set(c->priv_data, "x264-params",
+                         o->side_by_side ? "cpu-independent=1:rc-lookahead=12:frame-packing=3"
+                                         : "cpu-independent=1:rc-lookahead=12",
+                         0);
     if (o->codec == RFILM_VP9) {
         c->bit_rate = 0; /* or crf would only be a limit */
         libav.av_opt_set(c->priv_data, "row-mt", "1", 0);
@@ -202,7 +210,7 @@ static bool open_scaler(rfilm_encoder *e, mospt_err *err)
 bool rfilm_encoder_open(const char *path, const char *container, const rfilm_options *options,
                         rfilm_encoder **out, mospt_err *err)
 {
-    if (!check(options, path, err) || !rfilm_libav_load(err)) return false;
+    if (!rfilm_options_fit(options, path, err) || !rfilm_libav_load(err)) return false;
     rfilm_encoder *e = calloc(1, sizeof *e);
     if (e == NULL) return mospt_err_nomem(err, sizeof *e);
     e->options = *options;

@@ -30,6 +30,11 @@ typedef struct {
  */
 bool rfilm_codec_for(const char *path, const char *wanted, rfilm_codec *out, mospt_err *err);
 
+/* What can be known before the first picture: size, bits and quality.
+ * path     for errors
+ * errors   MOSPT_EINVAL */
+bool rfilm_options_fit(const rfilm_options *options, const char *path, mospt_err *err);
+
 typedef struct rfilm_encoder rfilm_encoder;
 
 /* container  a file name with the ending that says which container it is
