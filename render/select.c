@@ -1,33 +1,42 @@
 #include "render/select.h"
 
-#include <cglm/cglm.h>
+#include "render/sweep.h"
+
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
+enum { NONE = 0xffffffff, FLOOR_PARTS = 4 }; /* of half a node's width, see select.h */
+
+/* A node that has been looked at and is not skipped. */
 typedef struct {
-    float size_px; /* at the centre */
     uint32_t node;
-    uint32_t parent; /* in the draw list */
-} queued;
+    uint32_t parent; /* the seen one whose child it is */
+    uint32_t next;   /* in its bucket; NONE ends it */
+    uint32_t levels; /* index of its first one */
+    float begin;     /* x = 1 / cell^2 at which its first points appear */
+    float width_px;  /* at its nearest visible point */
+    uint32_t draw;   /* index of the draw of it, or of the nearest ancestor that is drawn */
+} seen_node;
 
 struct rend_selector {
     rend_selection result;
-    uint32_t draw_capacity, request_capacity;
-    queued *heap; /* [heap_capacity], owned; the largest on top */
-    uint32_t heap_count, heap_capacity;
+    seen_node *seen;  /* [seen_capacity], owned */
+    uint32_t *popped; /* [popped_capacity], owned: which, in that order */
+    rend_growth *levels;
+    uint32_t draw_capacity, request_capacity, seen_capacity, popped_capacity, level_capacity;
+    uint32_t seen_count, popped_count, level_count;
+    uint32_t bucket[REND_SWEEP_BUCKETS]; /* first seen node of each, NONE */
+    rend_sweep sweep;
 };
-
-/* Where a node is in this frame. */
-typedef struct {
-    vec3 centre; /* from the eye, grid axes, steps */
-    float half;  /* of its width */
-} placed;
 
 /* One traversal. */
 typedef struct {
     const rend_select_input *in;
     rend_selector *s;
-    float min_node_px, cell_px;
+    float focal2; /* square of the frame's focal length */
+    float corner_cos2;
+    double x_max; /* 1 / cell_px^2 */
     uint64_t pages;
 } walk;
 
@@ -42,56 +51,50 @@ void rend_select_destroy(rend_selector *selector)
     free(selector->result.draws);
     free(selector->result.octants);
     free(selector->result.requests);
-    free(selector->heap);
+    free(selector->seen);
+    free(selector->popped);
+    free(selector->levels);
     free(selector);
 }
 
-/* Room for one more of `size` bytes in an array that doubles. */
-static bool grow(void **array, uint32_t *capacity, uint32_t count, size_t size, mospt_err *err)
+/* Room for `more` in an array that doubles. */
+static void *grown(void *array, uint32_t *capacity, uint32_t count, uint32_t more, size_t size,
+                   mospt_err *err)
 {
-    if (count < *capacity) return true;
+    if (more <= *capacity - count) return array;
     uint32_t wanted = *capacity > 0 ? 2 * *capacity : 1024;
-    void *larger = realloc(*array, wanted * size);
-    if (larger == NULL) return mospt_err_nomem(err, wanted * size);
-    *array = larger, *capacity = wanted;
-    return true;
-}
-
-/* Larger first; of equal ones the one that stands first in the hierarchy, so that a frame does not
- * depend on history. */
-static bool goes_before(const queued *a, const queued *b)
-{
-    return a->size_px != b->size_px ? a->size_px > b->size_px : a->node < b->node;
-}
-
-static bool push(rend_selector *s, queued item, mospt_err *err)
-{
-    void *heap = s->heap;
-    if (!grow(&heap, &s->heap_capacity, s->heap_count, sizeof item, err)) return false;
-    s->heap = heap;
-    uint32_t at = s->heap_count++;
-    for (; at > 0 && goes_before(&item, &s->heap[(at - 1) / 2]); at = (at - 1) / 2)
-        s->heap[at] = s->heap[(at - 1) / 2];
-    s->heap[at] = item;
-    return true;
-}
-
-static queued pop(rend_selector *s)
-{
-    queued top = s->heap[0], last = s->heap[--s->heap_count];
-    uint32_t at = 0;
-    for (uint32_t child; (child = 2 * at + 1) < s->heap_count; at = child) {
-        if (child + 1 < s->heap_count && goes_before(&s->heap[child + 1], &s->heap[child])) child++;
-        if (!goes_before(&s->heap[child], &last)) break;
-        s->heap[at] = s->heap[child];
+    while (wanted - count < more)
+        wanted *= 2;
+    void *larger = realloc(array, wanted * size);
+    if (larger == NULL) {
+        mospt_err_nomem(err, wanted * size);
+        return NULL;
     }
-    s->heap[at] = last;
-    return top;
+    *capacity = wanted;
+    return larger;
 }
 
-static placed place(const walk *w, uint32_t node)
+static bool reserve(walk *w, mospt_err *err)
 {
-    const mospt_node *n = &w->in->hierarchy->nodes[node];
+    rend_selector *s = w->s;
+    void *seen = grown(s->seen, &s->seen_capacity, s->seen_count, 1, sizeof *s->seen, err);
+    if (seen == NULL) return false;
+    s->seen = seen;
+    void *levels = grown(s->levels, &s->level_capacity, s->level_count, MOSPT_LEVELS_MAX,
+                         sizeof *s->levels, err);
+    if (levels == NULL) return false;
+    s->levels = levels;
+    return true;
+}
+
+/* Where a node is in this frame. */
+typedef struct {
+    float centre[3]; /* from the eye, grid axes, steps */
+    float half;      /* of its width */
+} placed;
+
+static placed place(const walk *w, const mospt_node *n)
+{
     double half = 0.5 * (double)mospt_cell_width(w->in->grid, n->level);
     placed p = {.half = (float)half};
     for (int a = 0; a < 3; a++)
@@ -99,7 +102,7 @@ static placed place(const walk *w, uint32_t node)
     return p;
 }
 
-static float along(const float plane[3], const vec3 v)
+static float along(const float plane[3], const float v[3])
 {
     return plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
 }
@@ -111,90 +114,222 @@ static bool is_outside(const rend_frame *f, const placed *p)
     return false;
 }
 
-/* Projected width of the cube at its centre. Around the eye the distance ends at half the width, or
- * the one cube whose middle the eye happens to be in would be infinitely urgent. */
-static float size_at_centre(const rend_frame *f, const placed *p)
+static bool is_clipped(const walk *w, const mospt_node *n)
 {
-    float distance = sqrtf(along(p->centre, p->centre));
-    return 2 * p->half * f->focal_px / fmaxf(distance, p->half);
+    return w->in->clip != NULL &&
+           rend_clip_misses(w->in->clip, n->corner, mospt_cell_width(w->in->grid, n->level));
 }
 
-/* Largest projected width of the cube, were it at any of its visible places; infinite around the
- * eye. Two bounds on how near to the eye's plane those are, each better than the other somewhere:
- * the near side of the cube along the view axis, and its nearest point at the angle of the
- * picture's corner. */
-static float size_at_nearest(const rend_frame *f, const placed *p)
+/* Square of the largest projected width of the cube, were it at any of its visible places. Two
+ * bounds on how near to the eye's plane those are, each better than the other somewhere: the near
+ * side of the cube along the view axis, and its nearest point at the angle of the picture's corner.
+ */
+static float width2_at_nearest(const walk *w, const placed *p)
 {
-    vec3 gap;
-    for (int a = 0; a < 3; a++)
-        gap[a] = fmaxf(fabsf(p->centre[a]) - p->half, 0);
-    float w = sqrtf(along(gap, gap)) * f->corner_cos;
-    w = fmaxf(w, along(f->plane[4], p->centre) - p->half * f->plane_reach[4]);
-    return w > 0 ? 2 * p->half * f->focal_px / w : INFINITY;
+    const rend_frame *f = w->in->frame;
+    float gap2 = 0, ahead = along(f->plane[4], p->centre) - p->half * f->plane_reach[4];
+    for (int a = 0; a < 3; a++) {
+        float gap = fmaxf(fabsf(p->centre[a]) - p->half, 0);
+        gap2 += gap * gap;
+    }
+    float nearest = p->half / FLOOR_PARTS, w2 = fmaxf(gap2 * w->corner_cos2, nearest * nearest);
+    if (ahead > 0) w2 = fmaxf(w2, ahead * ahead);
+    return 4 * p->half * p->half * w->focal2 / w2;
 }
 
-static uint32_t level_for(uint32_t depth, float root_px, float cell_px)
+static void add_level(walk *w, float begin, uint32_t points)
 {
-    uint32_t level = 0;
-    while (level <= depth && root_px > cell_px)
-        root_px *= 0.5f, level++;
-    return level;
+    rend_selector *s = w->s;
+    if (points == 0) return;
+    s->levels[s->level_count++] = (rend_growth){begin, points};
 }
 
-/* The first level that holds most of the points drawn: 3/4, since a surface gains four times as
- * many with each level until its samples are reached. */
-static uint32_t density_level(const mospt_node *n, uint32_t depth, uint32_t count)
+/* The levels of a node, as they grow. Returns where the first one begins.
+ * begin    of a level with cells as wide as the node */
+static float add_levels(walk *w, const mospt_node *n, uint32_t node, float begin)
 {
-    uint32_t level = 0;
-    while (level < depth && n->level_end[level] < count - count / 4)
-        level++;
-    return level;
+    uint32_t depth = w->in->hierarchy->inner_depth;
+    float finest = ldexpf(begin, 2 * (int)depth);
+    if (node == 0)
+        for (uint32_t i = 1; i <= depth; i++)
+            add_level(w, ldexpf(begin, 2 * (int)i - 2), n->level_end[i] - n->level_end[i - 1]);
+    else add_level(w, finest / 4, n->level_end[depth]);
+    add_level(w, finest, n->count - n->level_end[depth]);
+    return node == 0 ? 0 : finest / 4;
 }
 
-static uint32_t cell_log2(const walk *w, const mospt_node *n, uint32_t inner_level)
+/* Steps 2 and 3; what passes them is queued.
+ * parent   the seen one, NONE for the root */
+static bool look_at(walk *w, uint32_t node, uint32_t parent, mospt_err *err)
 {
-    uint32_t bits = mospt_cell_bits(w->in->grid, n->level);
-    return bits > inner_level ? bits - inner_level : 0;
-}
-
-static bool queue_node(walk *w, uint32_t node, uint32_t parent, mospt_err *err)
-{
-    placed p = place(w, node);
-    return push(w->s, (queued){size_at_centre(w->in->frame, &p), node, parent}, err);
-}
-
-static bool queue_children(walk *w, uint32_t node, uint32_t parent, mospt_err *err)
-{
+    rend_selector *s = w->s;
     const mospt_node *n = &w->in->hierarchy->nodes[node];
-    for (uint32_t c = 0; c < n->child_count; c++)
-        if (!queue_node(w, n->first_child + c, parent, err)) return false;
+    placed p = place(w, n);
+    s->result.visited++;
+    if (is_outside(w->in->frame, &p) || is_clipped(w, n)) {
+        s->result.culled++;
+        return true;
+    }
+    float width2 = width2_at_nearest(w, &p), begin = 1 / width2,
+          shows = ldexpf(begin, 2 * (int)w->in->hierarchy->inner_depth - 2),
+          min2 = w->in->min_node_px * w->in->min_node_px;
+    if (node != 0 && ((double)shows >= w->x_max || width2 < min2)) {
+        s->result.small++;
+        return true;
+    }
+    if (!reserve(w, err)) return false;
+    seen_node seen = {.node = node,
+                      .parent = parent,
+                      .levels = s->level_count,
+                      .width_px = sqrtf(width2),
+                      .draw = REND_NO_DRAW};
+    seen.begin = add_levels(w, n, node, begin);
+    uint32_t bucket = rend_sweep_bucket(seen.begin);
+    if (bucket < s->sweep.bucket) bucket = s->sweep.bucket; /* rounding */
+    seen.next = s->bucket[bucket];
+    s->bucket[bucket] = s->seen_count;
+    s->seen[s->seen_count++] = seen;
     return true;
 }
 
-static bool request(walk *w, const queued *q, mospt_err *err)
+static rend_residency residency_of(const walk *w, uint32_t node)
+{
+    return w->in->residency == NULL ? REND_RESIDENT : w->in->residency[node];
+}
+
+static bool look_at_children(walk *w, uint32_t seen, mospt_err *err)
+{
+    const mospt_node *n = &w->in->hierarchy->nodes[w->s->seen[seen].node];
+    for (uint32_t c = 0; c < n->child_count; c++)
+        if (!look_at(w, n->first_child + c, seen, err)) return false;
+    return true;
+}
+
+/* Step 1, of the GPU cache: false if it is full. */
+static bool take_pages(walk *w, const mospt_node *n)
+{
+    const rend_select_input *in = w->in;
+    if (in->page_limit == 0) return true;
+    uint64_t pages = (n->count + (uint64_t)in->page_points - 1) / in->page_points;
+    if (w->pages + pages > in->page_limit) return false;
+    w->pages += pages;
+    return true;
+}
+
+/* Levels of a seen node: up to where those of the next one begin. */
+static uint32_t levels_end(const rend_selector *s, uint32_t seen)
+{
+    return seen + 1 < s->seen_count ? s->seen[seen + 1].levels : s->level_count;
+}
+
+static bool is_hidden(const walk *w, const mospt_node *n)
+{
+    return w->in->occlusion != NULL &&
+           rend_occlusion_hides(w->in->occlusion, n->corner,
+                                mospt_cell_width(w->in->grid, n->level));
+}
+
+/* A node that shows nothing. */
+static void never_grow(rend_selector *s, uint32_t seen)
+{
+    for (uint32_t i = s->seen[seen].levels; i < levels_end(s, seen); i++)
+        s->levels[i].points = 0;
+}
+
+/* Step 4, the first as far as it concerns the cache, and what hides, which only nodes that would be
+ * drawn are asked about. */
+static bool pop(walk *w, uint32_t seen, mospt_err *err)
+{
+    rend_selector *s = w->s;
+    uint32_t node = s->seen[seen].node;
+    const mospt_node *n = &w->in->hierarchy->nodes[node];
+    rend_residency residency = residency_of(w, node);
+    if (is_hidden(w, n)) {
+        s->result.hidden++;
+        s->result.points_hidden += n->count;
+        never_grow(s, seen);
+        return true;
+    }
+    if (residency == REND_DAMAGED) never_grow(s, seen);
+    else if (!take_pages(w, n)) {
+        s->result.stopped = true;
+        return true;
+    }
+    for (uint32_t i = s->seen[seen].levels; i < levels_end(s, seen); i++)
+        rend_sweep_add(&s->sweep, s->levels[i]);
+    void *popped =
+        grown(s->popped, &s->popped_capacity, s->popped_count, 1, sizeof *s->popped, err);
+    if (popped == NULL) return false;
+    s->popped = popped;
+    s->popped[s->popped_count++] = seen;
+    s->result.points_in_view += n->count;
+    return residency == REND_ABSENT || look_at_children(w, seen, err);
+}
+
+/* Pops what begins to show in each bucket, and what that brings in, until the budget is spent. */
+static bool traverse(walk *w, mospt_err *err)
+{
+    rend_selector *s = w->s;
+    rend_sweep *sweep = &s->sweep;
+    if (!look_at(w, 0, NONE, err)) return false;
+    for (;; rend_sweep_advance(sweep)) {
+        uint32_t *first = &s->bucket[sweep->bucket];
+        while (*first != NONE && !s->result.stopped) {
+            uint32_t seen = *first;
+            *first = s->seen[seen].next;
+            if (!pop(w, seen, err)) return false;
+            /* Out of the way of what did not fit the cache. */
+            if (!s->result.stopped) s->seen[seen].next = seen;
+        }
+        if (s->result.stopped || rend_sweep_end(sweep->bucket) >= w->x_max) return true;
+        if (rend_sweep_points(sweep) + 1 >= (double)w->in->budget_points) return true;
+    }
+}
+
+/* What was not popped does not grow. */
+static void forget_the_rest(rend_selector *s)
+{
+    for (uint32_t i = 0; i < s->seen_count; i++)
+        if (s->seen[i].next != i) never_grow(s, i);
+}
+
+/* The cell size that the budget buys, as x. The root's first point is there at any. */
+static double spend(walk *w)
+{
+    rend_selector *s = w->s;
+    double from = rend_sweep_begin(s->sweep.bucket),
+           to = fmin(rend_sweep_end(s->sweep.bucket), w->x_max);
+    forget_the_rest(s);
+    double x = rend_sweep_solve(s->levels, s->level_count, (double)w->in->budget_points - 1,
+                                fmin(from, to), to);
+    if (x < w->x_max) s->result.stopped = true;
+    return x;
+}
+
+static bool request(walk *w, const seen_node *seen, mospt_err *err)
 {
     rend_selection *r = &w->s->result;
-    void *requests = r->requests;
-    if (!grow(&requests, &w->s->request_capacity, r->request_count, sizeof *r->requests, err))
-        return false;
+    void *requests =
+        grown(r->requests, &w->s->request_capacity, r->request_count, 1, sizeof *r->requests, err);
+    if (requests == NULL) return false;
     r->requests = requests;
-    r->requests[r->request_count++] = (rend_request){q->node, q->size_px};
+    r->requests[r->request_count++] = (rend_request){seen->node, seen->width_px};
     return true;
 }
 
 /* Grows the list of draws, and the octants beside it. */
-static bool grow_draws(rend_selector *s, mospt_err *err)
+static bool reserve_draw(rend_selector *s, mospt_err *err)
 {
     rend_selection *r = &s->result;
     uint32_t capacity = s->draw_capacity;
-    void *draws = r->draws, *octants = r->octants;
-    if (!grow(&draws, &s->draw_capacity, r->draw_count, sizeof *r->draws, err)) return false;
+    void *draws = grown(r->draws, &capacity, r->draw_count, 1, sizeof *r->draws, err);
+    if (draws == NULL) return false;
     r->draws = draws;
-    if (!grow(&octants, &capacity, r->draw_count, 8 * sizeof *r->octants, err)) {
-        s->draw_capacity = capacity;
-        return false;
-    }
+    if (capacity == s->draw_capacity) return true;
+    void *octants = realloc(r->octants, capacity * 8 * sizeof *r->octants);
+    if (octants == NULL) return mospt_err_nomem(err, capacity * 8 * sizeof *r->octants);
     r->octants = octants;
+    s->draw_capacity = capacity;
     return true;
 }
 
@@ -208,106 +343,100 @@ static uint32_t octant_in(const walk *w, const mospt_node *n)
 
 /* Links the octant of the parent to this draw. The parent of a draw below a damaged node is farther
  * up: there the octant keeps the size of the parent's own cells. */
-static void link_to_parent(const walk *w, const queued *q)
+static void link_to_parent(const walk *w, const mospt_node *n, uint32_t parent)
 {
     const rend_selection *r = &w->s->result;
-    const mospt_node *n = &w->in->hierarchy->nodes[q->node];
-    if (q->parent == REND_NO_DRAW || r->draws[q->parent].node != n->parent) return;
-    r->octants[8 * (size_t)q->parent + octant_in(w, n)] = r->draw_count;
+    if (parent == REND_NO_DRAW || r->draws[parent].node != n->parent) return;
+    r->octants[8 * (size_t)parent + octant_in(w, n)] = r->draw_count;
 }
 
-static bool draw(walk *w, const queued *q, float nearest_px, uint32_t count, mospt_err *err)
+/* The first level that holds most of the points drawn: 3/4, since a surface gains four times as
+ * many with each level until its samples are reached. */
+static uint32_t density_level(const mospt_node *n, uint32_t depth, uint32_t count)
 {
-    const mospt_node *n = &w->in->hierarchy->nodes[q->node];
+    uint32_t level = 0;
+    while (level < depth && n->level_end[level] < count - count / 4)
+        level++;
+    return level;
+}
+
+static uint32_t splat_of(float width)
+{
+    uint32_t bits;
+    width = fmaxf(width, 1);
+    memcpy(&bits, &width, sizeof bits);
+    return bits | REND_SPLAT;
+}
+
+static bool draw(walk *w, seen_node *seen, uint32_t parent, uint32_t count, float cell_px,
+                 mospt_err *err)
+{
+    const mospt_node *n = &w->in->hierarchy->nodes[seen->node];
     rend_selection *r = &w->s->result;
-    if (!grow_draws(w->s, err)) return false;
-    uint32_t depth = w->in->hierarchy->inner_depth,
-             level = level_for(depth, nearest_px, w->cell_px);
-    uint32_t finest = level < depth ? level : depth, density = density_level(n, finest, count);
-    for (uint32_t o = 0; o < 8; o++) {
-        uint32_t cells = (n->child_mask | n->pending_mask) >> o & 1 ? finest : density;
-        r->octants[8 * (size_t)r->draw_count + o] = REND_SPLAT | cell_log2(w, n, cells);
-    }
-    link_to_parent(w, q);
+    if (!reserve_draw(w->s, err)) return false;
+    uint32_t depth = w->in->hierarchy->inner_depth, below = n->child_mask | n->pending_mask;
+    float width = (float)mospt_cell_width(w->in->grid, n->level),
+          finest = ldexpf(width, -(int)depth),
+          reached = fminf(fmaxf(width * (cell_px / seen->width_px), finest), width),
+          sampled = fmaxf(reached, ldexpf(width, -(int)density_level(n, depth, count)));
+    for (uint32_t o = 0; o < 8; o++)
+        r->octants[8 * (size_t)r->draw_count + o] = splat_of(below >> o & 1 ? reached : sampled);
+    link_to_parent(w, n, parent);
     r->draws[r->draw_count] = (rend_draw){
-        .node = q->node,
+        .node = seen->node,
         .count = count,
-        .parent = q->parent,
-        .widest_px = ldexpf(nearest_px, -(int)(n->child_mask == 0xff ? finest : density)),
+        .parent = parent,
+        .widest_px = (n->child_mask == 0xff ? reached : sampled) / width * seen->width_px,
     };
     r->points += count;
-    return queue_children(w, q->node, r->draw_count++, err);
+    seen->draw = r->draw_count++;
+    return true;
 }
 
-typedef enum { SEEN, CULLED, SMALL, HIDDEN } sight;
-
-static bool is_clipped(const walk *w, uint32_t node)
+/* Draws or requests what shows at x, in the order in which it was popped: parents stand before
+ * their children. */
+static bool take(walk *w, double x, mospt_err *err)
 {
-    const mospt_node *n = &w->in->hierarchy->nodes[node];
-    return w->in->clip != NULL &&
-           rend_clip_misses(w->in->clip, n->corner, mospt_cell_width(w->in->grid, n->level));
-}
-
-/* Steps 2 and 3. */
-static sight look_at(const walk *w, uint32_t node, const placed *p, float nearest_px)
-{
-    const mospt_node *n = &w->in->hierarchy->nodes[node];
-    if (is_outside(w->in->frame, p) || is_clipped(w, node)) return CULLED;
-    if (node != 0 && nearest_px < w->min_node_px) return SMALL;
-    bool hidden =
-        w->in->occlusion != NULL &&
-        rend_occlusion_hides(w->in->occlusion, n->corner, mospt_cell_width(w->in->grid, n->level));
-    return hidden ? HIDDEN : SEEN;
-}
-
-/* The four steps. */
-static bool visit(walk *w, const queued *q, mospt_err *err)
-{
-    const rend_select_input *in = w->in;
-    const mospt_node *n = &in->hierarchy->nodes[q->node];
-    rend_selection *r = &w->s->result;
-    placed p = place(w, q->node);
-    float nearest_px = size_at_nearest(in->frame, &p);
-    uint32_t depth = in->hierarchy->inner_depth;
-    uint32_t count = mospt_linear_prefix(n->level_end, depth, nearest_px, w->cell_px);
-    uint64_t pages =
-        in->page_limit > 0 ? (n->count + (uint64_t)in->page_points - 1) / in->page_points : 0;
-    rend_residency residency = in->residency == NULL ? REND_RESIDENT : in->residency[q->node];
-
-    if (residency == REND_DAMAGED) count = 0, pages = 0;
-    r->visited++;
-    if (count > in->budget_points - r->points ||
-        (in->page_limit > 0 && w->pages + pages > in->page_limit)) {
-        r->stopped = true;
-        return true;
+    rend_selector *s = w->s;
+    s->result.cell_px = (float)(1 / sqrt(x));
+    for (uint32_t i = 0; i < s->popped_count; i++) {
+        seen_node *seen = &s->seen[s->popped[i]];
+        uint32_t count = seen->node == 0, parent = REND_NO_DRAW;
+        for (uint32_t k = seen->levels; k < levels_end(s, s->popped[i]); k++)
+            count += rend_growth_at(s->levels[k], x);
+        if (seen->parent != NONE) parent = s->seen[seen->parent].draw;
+        seen->draw = parent;
+        rend_residency residency = residency_of(w, seen->node);
+        if (residency == REND_DAMAGED || count == 0) continue;
+        if (residency == REND_ABSENT ? !request(w, seen, err)
+                                     : !draw(w, seen, parent, count, s->result.cell_px, err))
+            return false;
     }
-    sight seen = look_at(w, q->node, &p, nearest_px);
-    r->culled += seen == CULLED, r->small += seen == SMALL;
-    r->hidden += seen == HIDDEN, r->points_hidden += seen == HIDDEN ? count : 0;
-    if (seen != SEEN) return true;
-    w->pages += pages;
-    r->points_in_view += n->count;
-    if (residency == REND_DAMAGED) return queue_children(w, q->node, q->parent, err);
-    if (residency == REND_RESIDENT) return draw(w, q, nearest_px, count, err);
-    return request(w, q, err);
+    return true;
+}
+
+static void start(rend_selector *s)
+{
+    s->result = (rend_selection){
+        .draws = s->result.draws, .octants = s->result.octants, .requests = s->result.requests};
+    s->seen_count = s->popped_count = s->level_count = 0;
+    s->sweep = (rend_sweep){0};
+    memset(s->bucket, 0xff, sizeof s->bucket);
 }
 
 bool rend_select_run(rend_selector *selector, const rend_select_input *input,
                      const rend_selection **out, mospt_err *err)
 {
-    selector->result = (rend_selection){.draws = selector->result.draws,
-                                        .octants = selector->result.octants,
-                                        .requests = selector->result.requests};
-    selector->heap_count = 0;
-    walk w = {
-        .in = input, .s = selector, .min_node_px = input->min_node_px, .cell_px = input->cell_px};
-    if (!(w.min_node_px > 0)) w.min_node_px = ldexpf(1, (int)input->hierarchy->inner_depth - 1);
-    if (!(w.cell_px > 0)) w.cell_px = 1;
-    if (input->hierarchy->count > 0 && !queue_node(&w, 0, REND_NO_DRAW, err)) return false;
-    while (selector->heap_count > 0 && !selector->result.stopped) {
-        queued q = pop(selector);
-        if (!visit(&w, &q, err)) return false;
-    }
+    const rend_frame *f = input->frame;
+    walk w = {.in = input,
+              .s = selector,
+              .focal2 = f->focal_px * f->focal_px,
+              .corner_cos2 = f->corner_cos * f->corner_cos};
+    double cell_px = (double)(input->cell_px > 0 ? input->cell_px : REND_CELL_PX_DEFAULT);
+    w.x_max = 1 / (cell_px * cell_px);
+    start(selector);
     *out = &selector->result;
-    return true;
+    if (input->budget_points == 0) selector->result.stopped = true;
+    if (input->budget_points == 0 || input->hierarchy->count == 0) return true;
+    return traverse(&w, err) && take(&w, spend(&w), err);
 }

@@ -3,21 +3,33 @@
  * Wimmer & Scheiblauer 2006, section 5.3: the outer octree is walked by a priority queue, largest
  * projected node first. For each node popped, in this order:
  *
- *   1. Would its points exceed the budget? Then the traversal stops.
+ *   1. Is the budget spent? Then the traversal stops.
  *   2. Is it outside the view frustum, or of the clip box? Then it is skipped, with all below it.
  *   3. Is its lowest level too small? Then it is skipped, with all below it.
  *      Or hidden behind what is drawn (render/occlusion.h)? Then, too: the paper's future work.
  *   4. Is it resident? Then it is put on the draw list and its children on the queue. Else it is
  *      requested and skipped.
  *
- * Step 3, as read here. A node's points refine those of its parent, whose finest cells are twice as
- * wide as its own; where even those project to less than a pixel, the node adds nothing that shows.
- * Said of the node's cube, that is a projected width of less than 2^(d-1) pixels: the minimum node
- * size. The root is never skipped by it: it has no parent to stand for it.
+ * The budget buys one cell size, in pixels, for the whole picture (render/sweep.h): the smallest at
+ * which all prefixes together are within the budget, but no smaller than cell_px. A node's points
+ * refine those of its parent, whose finest cells are twice as wide as its own, and so its prefix
+ * grows from nothing to its finest level while cells shrink from the one to the other. The root
+ * grows through its levels one by one; points that share a finest cell appear while cells shrink to
+ * half of that. So density on screen is the same on both sides of a border between nodes, follows
+ * the distance without steps, and the last point of the budget is spent as well as the first.
  *
- * Projected sizes. The queue is ordered by the size at the node's centre, so that a node does not
- * gain from one corner that touches the eye. Prefix and minimum node size are taken at its nearest
- * visible point (min(r) of section 4.5).
+ * Steps 1 to 3, as read here. Nodes are popped in the order in which they begin to show; the cell
+ * size falls as they are, and the traversal stops where the budget is spent by what shows at that
+ * size, which is the sum with every prefix as it is then: a node that was popped early has grown
+ * since. "Too small" is a node whose first points would show below cell_px only. What is outside is
+ * found to be so before it is queued, which saves the queue most nodes. The root is never too
+ * small: it has no parent to stand for it.
+ *
+ * Projected sizes are taken at a node's nearest visible point (min(r) of section 4.5), but no
+ * nearer than a quarter of half its width, so that a node does not take the whole budget by one
+ * corner that touches the eye.
+ *
+ * What has to be fetched counts as drawn: when it arrives, the cell size stays as it is.
  *
  * Splat sizes (end of section 5.3) follow the finest node drawn around a point, which need not be
  * the one that the point is stored in: the points of the root stand everywhere between those of its
@@ -25,9 +37,9 @@
  * density varies, that is too small here and too large there. So the selection tells for each
  * octant of each node drawn what comes below it, and the vertex shader walks down to the size that
  * holds at its place. An octant whose child is not drawn, be it missing or beyond the budget, has
- * the size of the finest cells drawn of the node itself, so that a missing child leaves no gap. An
- * octant without a child has the cells of the first level that holds most of the node's points,
- * which is coarsely the sampling density.
+ * the cell size up to which the node itself has grown, so that a missing child leaves no gap. An
+ * octant without a child has at least the cells of the first level that holds most of the node's
+ * points, which is coarsely the sampling density.
  *
  * Pure: no GL, no file, no clock; no allocation once the workspace has grown to the size of the
  * frame. */
@@ -50,8 +62,8 @@ typedef struct {
     const rend_occlusion *occlusion; /* aimed at the frame; NULL: nothing is hidden */
     const uint8_t *residency; /* [hierarchy->count] rend_residency; NULL: everything is resident */
     uint64_t budget_points;   /* 0: nothing; REND_ALL: no limit */
-    float min_node_px;        /* 0: 2^(d-1), see above */
-    float cell_px; /* a level is fine enough when its cells project to at most this; 0: 1 */
+    float min_node_px;        /* nodes but the root that project to less are skipped; 0: none */
+    float cell_px;            /* cells are no smaller than this; 0: REND_CELL_PX_DEFAULT */
     /* What is drawn and requested must fit the GPU cache together, or nodes would push each other
      * out for ever: nodes that do not are as if beyond the budget. Counted in pages, as the cache
      * does. */
@@ -65,14 +77,16 @@ typedef struct {
     uint32_t node;
     uint32_t count;  /* leading points to draw */
     uint32_t parent; /* index of the parent in the draw list; REND_NO_DRAW for the root */
-    float widest_px; /* widest cell of its octants where the node is nearest to the eye; infinite
-                        around it */
+    float widest_px; /* widest cell of its octants where the node is nearest to the eye */
 } rend_draw;
+
+/* Where splats of 1.25 cells (render/stage.c) are a pixel wide: nothing finer shows. */
+#define REND_CELL_PX_DEFAULT 0.8f
 
 enum { REND_NO_DRAW = 0xffffffff };
 
-/* An octant of a drawn node: the index of the child in the draw list, or this bit and the log2 of
- * the splat's width in steps. */
+/* An octant of a drawn node: the index of the child in the draw list, or, with this bit, the bits
+ * of a float: minus the cell's width in steps. */
 #define REND_SPLAT UINT32_C(0x80000000)
 
 typedef struct {
@@ -88,10 +102,11 @@ typedef struct {
     uint32_t request_count;
     uint64_t points;                 /* sum of the counts of all draws */
     uint64_t points_in_view;         /* of all nodes that passed steps 1 to 3, all their points */
-    uint32_t visited, culled, small; /* nodes popped; skipped in step 2; in step 3 */
+    uint32_t visited, culled, small; /* nodes looked at; skipped in step 2; in step 3 */
     uint32_t hidden;                 /* nodes skipped behind what is drawn */
-    uint64_t points_hidden; /* what would have been drawn of them; not of those below them */
-    bool stopped;           /* in step 1: the budget is spent */
+    uint64_t points_hidden;          /* all points of those; not of what is below them */
+    float cell_px;                   /* what the budget bought */
+    bool stopped;                    /* in step 1: the budget is spent */
 } rend_selection;
 
 typedef struct rend_selector rend_selector; /* the workspace */

@@ -325,7 +325,7 @@ static int group_of(const rend_look *look, const rend_draw *d)
 {
     float widest = look->size_mode == REND_SIZE_AUTO ? SPLAT_PER_CELL * d->widest_px : INFINITY;
     widest = fminf(widest, point_px_max(look));
-    if (widest <= point_px_min(look)) return GROUP_SMALLEST;
+    if (widest <= 1.001f * point_px_min(look)) return GROUP_SMALLEST;
     return widest > SQUARE_PX_MAX ? GROUP_WIDE : GROUP_SMALL;
 }
 
@@ -697,13 +697,13 @@ static bool may_hide(const rend_stage *s, const rend_view_of *view)
            (s->selection->stopped || s->selection->points > OCCLUSION_POINTS_MIN);
 }
 
-/* What the picture will look like, from a part of its points: with cells twice as wide, where
- * splats are, too. */
+/* What the picture will look like, from a part of its points: with cells nearly twice as wide,
+ * where splats are, too. */
 static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *err)
 {
     rend_select_input input = input_of(s, view);
     if (view->budget_points != REND_ALL) input.budget_points /= OCCLUDER_SHARE;
-    if (view->look.size_mode == REND_SIZE_AUTO) input.cell_px = 2;
+    if (view->look.size_mode == REND_SIZE_AUTO) input.cell_px = 1.4f;
     return run_selection(s, view, &input, err) && draw_all(s, view, RGL_BEGIN, 0, 0, err) &&
            learn_occlusion(s, err);
 }

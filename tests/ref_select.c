@@ -4,7 +4,7 @@
 #include <stdlib.h>
 
 typedef struct {
-    double centre_px, nearest_px;
+    double nearest_px;
     bool outside;
 } view_of_node;
 
@@ -43,103 +43,99 @@ static view_of_node look(const rend_select_input *in, uint32_t node, bool *close
     for (int a = 0; a < 3; a++)
         ahead += f->plane[4][a] * (c[a] - (f->plane[4][a] > 0 ? half : -half));
     double w = fmax(sqrt(to_box) * f->corner_cos, ahead);
-    double width_px = 2 * half * f->focal_px;
-    v.centre_px = width_px / fmax(sqrt(to_centre), half);
-    v.nearest_px = w > 0 ? width_px / w : INFINITY;
-    if (w != 0 && fabs(w) < 1e-4 * half) *close_call = true;
+    v.nearest_px = 2 * half * f->focal_px / fmax(w, half / 4);
     return v;
 }
 
-static double or_one(float value)
+static double grown(double x, double begin, double points)
 {
-    return value > 0 ? (double)value : 1;
+    return points * fmin(fmax((x / begin - 1) / 3, 0), 1);
+}
+
+/* Points of a node that is `width_px` wide. */
+static double points_at(const rend_select_input *in, uint32_t node, double width_px, double cell_px)
+{
+    const mospt_node *n = &in->hierarchy->nodes[node];
+    uint32_t depth = in->hierarchy->inner_depth;
+    double x = pow(cell_px, -2), begin = pow(width_px, -2), finest = begin * pow(4, depth), sum = 0;
+    if (node == 0) {
+        sum = 1;
+        for (uint32_t i = 1; i <= depth; i++)
+            sum += grown(x, begin * pow(4, i - 1), n->level_end[i] - n->level_end[i - 1]);
+    } else sum = grown(x, finest / 4, n->level_end[depth]);
+    return sum + grown(x, finest, n->count - n->level_end[depth]);
+}
+
+/* Fills in what each node shows; returns the sum. */
+static double show(const rend_select_input *in, uint32_t node, double cell_px, ref_selection *out)
+{
+    const mospt_node *n = &in->hierarchy->nodes[node];
+    view_of_node v = look(in, node, &out->close_call);
+    rend_residency state = in->residency == NULL ? REND_RESIDENT : in->residency[node];
+    if (v.outside) return 0;
+    if (node > 0 && v.nearest_px < (double)in->min_node_px) return 0;
+    if (node > 0 && close_to(v.nearest_px, (double)in->min_node_px)) out->close_call = true;
+    double sum = state == REND_DAMAGED ? 0 : points_at(in, node, v.nearest_px, cell_px);
+    out->points[node] = sum;
+    if (state != REND_ABSENT)
+        for (uint32_t c = 0; c < n->child_count; c++)
+            sum += show(in, n->first_child + c, cell_px, out);
+    return sum;
+}
+
+static double sum_at(const rend_select_input *in, double cell_px, ref_selection *out)
+{
+    for (uint32_t n = 0; n < in->hierarchy->count; n++)
+        out->points[n] = 0;
+    return show(in, 0, cell_px, out);
 }
 
 void ref_select(const rend_select_input *in, ref_selection *out)
 {
-    uint32_t n_max = in->hierarchy->count, depth = in->hierarchy->inner_depth, waiting = 0;
-    ref_selection r = {0};
-    r.draw_node = calloc(n_max, sizeof(uint32_t)),
-    r.draw_count_of = calloc(n_max, sizeof(uint32_t));
-    r.finest = calloc(n_max, sizeof(uint32_t)), r.request = calloc(n_max, sizeof(uint32_t));
-    uint32_t *list = calloc(n_max, sizeof(uint32_t));
-    uint64_t pages = 0;
-    double min_px = in->min_node_px > 0 ? (double)in->min_node_px : pow(2, (double)depth - 1);
-    list[waiting++] = 0;
-    while (waiting > 0 && !r.stopped) {
-        uint32_t best = 0;
-        double best_px = -1;
-        for (uint32_t i = 0; i < waiting; i++) {
-            double px = look(in, list[i], &r.close_call).centre_px;
-            if (i > 0 && close_to(px, best_px)) r.close_call = true;
-            if (px > best_px || (px == best_px && list[i] < list[best])) best = i, best_px = px;
-        }
-        uint32_t node = list[best];
-        list[best] = list[--waiting];
-        const mospt_node *n = &in->hierarchy->nodes[node];
-        view_of_node v = look(in, node, &r.close_call);
-        double px = v.nearest_px;
-        uint32_t level = 0;
-        for (; level <= depth && px > or_one(in->cell_px); level++)
-            px /= 2;
-        for (uint32_t i = 0; i <= depth; i++)
-            if (close_to(v.nearest_px / pow(2, i), or_one(in->cell_px))) r.close_call = true;
-        if (close_to(v.nearest_px, min_px)) r.close_call = true;
-        uint32_t count = n->level_end[level];
-        rend_residency state = in->residency == NULL ? REND_RESIDENT : in->residency[node];
-        uint64_t node_pages =
-            in->page_limit > 0 ? (n->count + in->page_points - 1) / in->page_points : 0;
-        if (state == REND_DAMAGED) count = 0, node_pages = 0;
-
-        bool over = count > in->budget_points - r.points ||
-                    (in->page_limit > 0 && pages + node_pages > in->page_limit);
-        if (over) r.stopped = true;                            /* step 1 */
-        else if (v.outside) continue;                          /* step 2 */
-        else if (node != 0 && v.nearest_px < min_px) continue; /* step 3 */
-        else if (state == REND_ABSENT) r.request[r.requests++] = node, pages += node_pages;
-        else { /* step 4 */ pages += node_pages;
-            for (uint32_t c = 0; c < n->child_count; c++)
-                list[waiting++] = n->first_child + c;
-            if (state == REND_DAMAGED) continue;
-            r.draw_node[r.draws] = node;
-            r.draw_count_of[r.draws] = count;
-            r.finest[r.draws++] = level < depth ? level : depth;
-            r.points += count;
-        }
+    double fine = (double)(in->cell_px > 0 ? in->cell_px : REND_CELL_PX_DEFAULT), coarse = 1e6;
+    double budget = (double)in->budget_points;
+    *out = (ref_selection){.points = calloc(in->hierarchy->count, sizeof *out->points)};
+    out->stopped = sum_at(in, fine, out) > budget;
+    if (!out->stopped) coarse = fine;
+    for (int i = 0; i < 60 && out->stopped; i++) {
+        double middle = sqrt(fine * coarse);
+        if (sum_at(in, middle, out) > budget) fine = middle;
+        else coarse = middle;
     }
-    free(list);
-    *out = r;
+    out->cell_px = coarse;
+    if (sum_at(in, coarse, out) > budget) sum_at(in, 1e9, out); /* not even the root's first */
 }
 
 void ref_select_fini(ref_selection *s)
 {
-    free(s->draw_node);
-    free(s->draw_count_of);
-    free(s->finest);
-    free(s->request);
+    free(s->points);
     *s = (ref_selection){0};
 }
 
-double ref_select_cell_at(const rend_select_input *in, const ref_selection *s,
+double ref_select_cell_at(const rend_select_input *in, const rend_selection *s,
                           const uint32_t place[3])
 {
-    uint32_t found = MOSPT_NO_NODE;
-    for (uint32_t i = 0; i < s->draws; i++) {
-        const mospt_node *n = &in->hierarchy->nodes[s->draw_node[i]];
+    const rend_draw *found = NULL;
+    uint32_t depth = in->hierarchy->inner_depth, octant = 0, level = 0;
+    bool unused;
+    for (uint32_t i = 0; i < s->draw_count; i++) {
+        const mospt_node *n = &in->hierarchy->nodes[s->draws[i].node];
         if (!mospt_cell_contains(in->grid, n->corner, n->level, place[0], place[1], place[2]))
             continue;
-        if (found == MOSPT_NO_NODE || n->level > in->hierarchy->nodes[s->draw_node[found]].level)
-            found = i;
+        if (found == NULL || n->level > in->hierarchy->nodes[found->node].level)
+            found = &s->draws[i];
     }
-    if (found == MOSPT_NO_NODE) return 0;
-    const mospt_node *n = &in->hierarchy->nodes[s->draw_node[found]];
-    uint32_t bits = mospt_cell_bits(in->grid, n->level), octant = 0, level = s->finest[found];
+    if (found == NULL) return 0;
+    const mospt_node *n = &in->hierarchy->nodes[found->node];
+    uint32_t bits = mospt_cell_bits(in->grid, n->level);
+    double width = pow(2, bits), px = look(in, found->node, &unused).nearest_px;
+    double cell = fmin(fmax(width * (double)s->cell_px / px, width / pow(2, depth)), width);
     for (int a = 0; bits > 0 && a < 3; a++)
         octant |= (uint32_t)(place[a] >> (bits - 1) & 1) << a;
     if (!(n->child_mask >> octant & 1)) {
-        uint32_t most = s->draw_count_of[found] - s->draw_count_of[found] / 4;
-        for (level = 0; level < s->finest[found] && n->level_end[level] < most;)
+        while (level < depth && n->level_end[level] < found->count - found->count / 4)
             level++;
+        cell = fmax(cell, width / pow(2, level));
     }
-    return bits > level ? pow(2, bits - level) : 1;
+    return fmax(cell, 1);
 }

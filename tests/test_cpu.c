@@ -50,7 +50,7 @@ static rend_frame frame_of(look_kind look, const uint32_t at[3])
     return frame;
 }
 
-/* A tree of three levels whose cells are of three sizes. */
+/* A tree of three levels whose cells are of many sizes. */
 static uint32_t make_octants(uint32_t octants[8 * 73])
 {
     uint32_t nodes = 1, made = 0;
@@ -58,8 +58,10 @@ static uint32_t make_octants(uint32_t octants[8 * 73])
     for (; made < nodes; made++)
         for (uint32_t o = 0; o < 8; o++) {
             bool deeper = made < 9 && nodes < 73 && core_below(&state, 3) > 0;
-            octants[8 * made + o] =
-                deeper ? nodes++ : REND_SPLAT | (BITS - 8 - core_below(&state, 3));
+            float width = (float)(core_unit(&state) * (1 << (BITS - 8)));
+            uint32_t bits;
+            memcpy(&bits, &width, sizeof bits);
+            octants[8 * made + o] = deeper ? nodes++ : REND_SPLAT | bits;
         }
     return nodes;
 }

@@ -1,6 +1,8 @@
 /* Splats of several pixels: squares, discs, and discs that bend away from the eye. */
 #include "render/cpu/project.h"
 
+#include <string.h>
+
 void RCPU_NAME(splats)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                        int64_t *frame);
 
@@ -31,7 +33,8 @@ static void walk_down(walker *w, uint32_t x, uint32_t y, uint32_t z, int bit)
         uint32_t octant = (x >> bit & 1) | (y >> bit & 1) << 1 | (z >> bit & 1) << 2;
         uint32_t found = w->octants[8 * (size_t)node + octant];
         if (found >= 0x80000000u) {
-            w->cell = (float)(UINT64_C(1) << (found & 63));
+            found &= 0x7fffffff; /* the sign only marks it */
+            memcpy(&w->cell, &found, sizeof w->cell);
             break;
         }
         node = found;

@@ -28,7 +28,7 @@ const char RGL_POINTS_VERTEX[] =
     "        uvec3 side = place >> uint(bit) & 1u;\n"
     "        uint entry = 8u * node + (side.x | side.y << 1 | side.z << 2);\n"
     "        uint found = texelFetch(octants, ivec2(entry & 1023u, entry >> 10), 0).r;\n"
-    "        if (found >= 0x80000000u) return exp2(float(found & 63u));\n"
+    "        if (found >= 0x80000000u) return -uintBitsToFloat(found);\n"
     "        node = found;\n"
     "    }\n"
     "    return 1.0;\n"
