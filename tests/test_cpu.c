@@ -165,7 +165,7 @@ static rgl_scene scene_of(const size_case *c, look_kind look, const uint32_t at[
     scene.octant_nodes = make_octants(t->octants);
     scene.octants = c->octants ? t->octants : NULL;
     for (int a = 0; a < 3; a++)
-        t->clip.low[a] = at[a] + (1 << BITS) / 5, t->clip.high[a] = at[a] + ((2u << BITS) - 1) / 2;
+        t->clip.low[a] = at[a] + (1 << BITS) / 5, t->clip.high[a] = at[a] + (4u << BITS) / 5;
     scene.clip = c->clip ? &t->clip : NULL;
     scene.splat_scale = 1.25f, scene.splat_size = c->size;
     scene.px_min = c->least, scene.px_max = c->most;

@@ -34,11 +34,6 @@ typedef uint32_t lanes_u __attribute__((vector_size(4 * RCPU_LANES)));
     __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31)
 #endif
 
-static inline lanes_f lanes_floats(lanes_i bits)
-{
-    return (lanes_f)bits;
-}
-
 /* Where the mask is -1 the first, where it is 0 the second. */
 static inline lanes_i lanes_pick_i(lanes_i mask, lanes_i yes, lanes_i no)
 {
@@ -63,4 +58,12 @@ static inline lanes_f lanes_min(lanes_f a, lanes_f b)
 static inline lanes_f lanes_all(float value)
 {
     return (lanes_f){0} + value;
+}
+
+static inline bool lanes_any(lanes_i mask)
+{
+    int32_t any = 0;
+    for (int l = 0; l < RCPU_LANES; l++)
+        any |= mask[l];
+    return any != 0;
 }

@@ -1,65 +1,24 @@
 /* Splats of several pixels: squares, discs, and discs that bend away from the eye. */
 #include "render/cpu/project.h"
-
-#include <string.h>
+#include "render/cpu/walk.h"
 
 void RCPU_NAME(splats)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                        int64_t *frame);
 
-/* The walk of RGL_POINTS_VERTEX from the root to the cell of a place, remembered: the next place is
- * mostly nearby, and then the walk starts where the two part. */
-typedef struct {
-    const uint32_t *octants;
-    uint32_t used_bits; /* of a place, as a mask */
-    uint32_t place[3];  /* the last one */
-    uint32_t node[33];  /* [bit + 1] node whose octant that bit of the last place chose */
-    int leaf;           /* the bit that ended the walk; -1: none did */
-    float cell;
-} walker;
-
-static walker start_walk(const rcpu_view *v)
-{
-    walker w = {.octants = v->octants, .cell = 1, .leaf = (int)v->grid_bits};
-    w.used_bits = v->grid_bits < 32 ? (UINT32_C(1) << v->grid_bits) - 1 : UINT32_MAX;
-    return w;
-}
-
-static void walk_down(walker *w, uint32_t x, uint32_t y, uint32_t z, int bit)
-{
-    uint32_t node = w->node[bit + 1];
-    w->cell = 1;
-    for (; bit >= 0; bit--) {
-        w->node[bit + 1] = node;
-        uint32_t octant = (x >> bit & 1) | (y >> bit & 1) << 1 | (z >> bit & 1) << 2;
-        uint32_t found = w->octants[8 * (size_t)node + octant];
-        if (found >= 0x80000000u) {
-            found &= 0x7fffffff; /* the sign only marks it */
-            memcpy(&w->cell, &found, sizeof w->cell);
-            break;
-        }
-        node = found;
-    }
-    w->leaf = bit;
-}
-
-static float cell_at(walker *w, uint32_t x, uint32_t y, uint32_t z, uint32_t grid_bits)
-{
-    uint32_t differ = ((x ^ w->place[0]) | (y ^ w->place[1]) | (z ^ w->place[2])) & w->used_bits;
-    int bit = differ != 0 ? 31 - __builtin_clz(differ) : -1;
-    bool first = w->leaf == (int)grid_bits;
-    if (!first && bit < w->leaf) return w->cell;
-    if (!first && bit < 0) return w->cell;
-    w->place[0] = x, w->place[1] = y, w->place[2] = z;
-    walk_down(w, x, y, z, first ? (int)grid_bits - 1 : bit);
-    return w->cell;
-}
-
-static lanes_f cells_of(const rcpu_view *v, const rcpu_block *block, lanes_i inside, walker *w)
+/* Cells are looked up one by one: most points lie in the cell of the one before. */
+static lanes_f cells_of(const rcpu_view *v, const rcpu_block *block, lanes_i inside, rcpu_walk *w)
 {
     lanes_f cells = lanes_all(1);
-    for (int l = 0; v->octants != NULL && l < RCPU_LANES; l++)
+    if (v->octants == NULL) return cells;
+    lanes_u differ =
+        ((block->x ^ w->place[0]) | (block->y ^ w->place[1]) | (block->z ^ w->place[2])) &
+        w->used_bits;
+    lanes_i elsewhere = (lanes_i)(w->leaf < 0 ? differ : differ >> w->leaf) & inside;
+    cells = lanes_all(w->cell);
+    if (!lanes_any(elsewhere)) return cells;
+    for (int l = 0; l < RCPU_LANES; l++)
         if (inside[l] != 0)
-            cells[l] = cell_at(w, block->x[l], block->y[l], block->z[l], v->grid_bits);
+            cells[l] = rcpu_walk_to(w, (uint32_t[3]){block->x[l], block->y[l], block->z[l]});
     return cells;
 }
 
@@ -92,8 +51,8 @@ static void place_splats(const rcpu_view *v, const rcpu_places *p, lanes_f size,
     lanes_i low = rcpu_snap(p->y) - 128 - (fixed >> 1);
     lanes_i x0 = (left + 255) >> 8, x1 = (left + fixed + 255) >> 8;
     lanes_i y0 = (low + 255) >> 8, y1 = (low + fixed + 255) >> 8;
-    x0 = at_least(x0, 0), x1 = at_most(x1, width) & p->inside;
-    lanes_i top = at_least(height - y1, 0), bottom = at_most(height - y0, height);
+    x0 = at_least(x0, 0), x1 = at_most(x1, width);
+    lanes_i top = at_least(height - y1, 0), bottom = at_most(height - y0, height) & p->inside;
     lanes_f from_top = (float)height - p->y;
     memcpy(out->left, &x0, sizeof x0);
     memcpy(out->right, &x1, sizeof x1);
@@ -104,47 +63,72 @@ static void place_splats(const rcpu_view *v, const rcpu_places *p, lanes_f size,
     memcpy(out->size, &size, sizeof size);
 }
 
-static inline void put(int64_t *pixel, int64_t key)
+/* Pixels of a row, as many as fit a vector. */
+enum { SPAN = RCPU_LANES / 2 };
+typedef int64_t span_l __attribute__((vector_size(8 * SPAN)));
+typedef int32_t span_i __attribute__((vector_size(4 * SPAN)));
+typedef float span_f __attribute__((vector_size(4 * SPAN)));
+
+static inline span_i span_count(void)
 {
-    if (key < *pixel) *pixel = key;
+    span_i count;
+    for (int i = 0; i < SPAN; i++)
+        count[i] = i;
+    return count;
+}
+
+/* Pixels beyond the mask are written as they were: a frame belongs to one thread, and has room at
+ * its end. */
+static inline void put(int64_t *pixels, span_l keys, span_l mask)
+{
+    span_l before;
+    memcpy(&before, pixels, sizeof before);
+    span_l nearer = (keys < before) & mask;
+    before = (nearer & keys) | (~nearer & before);
+    memcpy(pixels, &before, sizeof before);
 }
 
 static void draw_square(const splat_block *s, uint32_t l, int64_t key, uint32_t stride,
                         int64_t *frame)
 {
-    for (int32_t y = s->top[l]; y < s->bottom[l]; y++) {
-        int64_t *row = frame + (size_t)y * stride;
-        for (int32_t x = s->left[l]; x < s->right[l]; x++)
-            put(row + x, key);
+    span_l keys = (span_l){0} + key;
+    for (int32_t x = s->left[l]; x < s->right[l]; x += SPAN) {
+        span_l mask = __builtin_convertvector(span_count() < s->right[l] - x, span_l);
+        for (int32_t y = s->top[l]; y < s->bottom[l]; y++)
+            put(frame + (size_t)y * stride + x, keys, mask);
     }
 }
 
-/* The bits of the distance of a splat that bends away, above its colour. */
-static int64_t bend_key(int64_t key, float share)
+/* Distances of a splat that bends away, above its colour. */
+static inline span_l bent_keys(int64_t key, span_f share)
 {
-    uint32_t bits = (uint32_t)(key >> 32);
+    int32_t bits = (int32_t)(key >> 32);
     float w;
     memcpy(&w, &bits, sizeof w);
-    w *= 1 + share;
-    memcpy(&bits, &w, sizeof bits);
-    return (int64_t)bits << 32 | (key & UINT32_MAX);
+    span_i bent = (span_i)(w * (1 + share));
+    return __builtin_convertvector(bent, span_l) << 32 | (key & UINT32_MAX);
 }
 
 static void draw_disc(const rcpu_view *v, const splat_block *s, uint32_t l, int64_t key,
                       int64_t *frame)
 {
     float scale = 2 / s->size[l], bend = v->bend * s->size[l];
-    for (int32_t y = s->top[l]; y < s->bottom[l]; y++) {
-        int64_t *row = frame + (size_t)y * v->size.stride;
-        float dy = ((float)y + 0.5f - s->y[l]) * scale;
-        for (int32_t x = s->left[l]; x < s->right[l]; x++) {
-            float dx = ((float)x + 0.5f - s->x[l]) * scale, r2 = dx * dx + dy * dy;
-            if (r2 <= 1) put(row + x, bend > 0 ? bend_key(key, r2 * bend) : key);
+    span_f count = __builtin_convertvector(span_count(), span_f);
+    for (int32_t x = s->left[l]; x < s->right[l]; x += SPAN) {
+        span_f dx = ((count + ((float)x + 0.5f)) - s->x[l]) * scale;
+        span_i within = span_count() < s->right[l] - x;
+        for (int32_t y = s->top[l]; y < s->bottom[l]; y++) {
+            float dy = ((float)y + 0.5f - s->y[l]) * scale;
+            span_f r2 = dx * dx + dy * dy;
+            span_l mask = __builtin_convertvector((r2 <= 1) & within, span_l);
+            span_l keys = bend > 0 ? bent_keys(key, r2 * bend) : (span_l){0} + key;
+            put(frame + (size_t)y * v->size.stride + x, keys, mask);
         }
     }
 }
 
-static void draw_block(const rcpu_view *v, const mospt_vertex *vertices, walker *w, int64_t *frame)
+static void draw_block(const rcpu_view *v, const mospt_vertex *vertices, rcpu_walk *w,
+                       int64_t *frame)
 {
     splat_block splats;
     rcpu_block block = rcpu_load(vertices);
@@ -165,7 +149,8 @@ void RCPU_NAME(splats)(const rcpu_view *view, const mospt_vertex *vertices, uint
                        int64_t *frame)
 {
     uint32_t i = 0;
-    walker w = start_walk(view);
+    rcpu_walk w;
+    if (view->octants != NULL) rcpu_walk_start(&w, view->octants, view->grid_bits);
     for (; i + RCPU_LANES <= count; i += RCPU_LANES)
         draw_block(view, vertices + i, &w, frame);
     if (i == count) return;
