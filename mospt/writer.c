@@ -48,6 +48,7 @@ struct mospt_writer {
     uint32_t file_count;
     int fd[FILES_MAX];
     uint64_t size[FILES_MAX];
+    uint64_t unflushed[FILES_MAX]; /* bytes that were written since the last flush began */
 };
 
 static bool is_unfinished(const char *name)
@@ -243,11 +244,35 @@ bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *
 bool mospt_writer_write_part(mospt_writer *w, const mospt_node *node, uint64_t skip,
                              const uint8_t *bytes, size_t size, mospt_err *err)
 {
-    if (w->sink != NULL)
-        return mospt_sink_write(w->sink, node->payload_file, node->payload_offset + skip, bytes,
-                                size, err);
-    return mospt_file_write_at(w->fd[node->payload_file], w->path, node->payload_offset + skip,
-                               bytes, size, err);
+    uint64_t offset = node->payload_offset + skip;
+    uint32_t file = node->payload_file;
+    bool ok = w->sink != NULL ? mospt_sink_write(w->sink, file, offset, bytes, size, err)
+                              : mospt_file_write_at(w->fd[file], w->path, offset, bytes, size, err);
+    pthread_mutex_lock(&w->lock);
+    w->unflushed[file] += size;
+    pthread_mutex_unlock(&w->lock);
+    return ok;
+}
+
+static bool flush_file(mospt_writer *w, uint32_t file, mospt_err *err)
+{
+    pthread_mutex_lock(&w->lock);
+    w->unflushed[file] = 0;
+    pthread_mutex_unlock(&w->lock);
+    return fsync(w->fd[file]) == 0 ||
+           mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
+                         PAYLOAD_NAME " cannot be flushed to the disk", file);
+}
+
+bool mospt_writer_flush(mospt_writer *w, mospt_err *err)
+{
+    uint32_t most = 0;
+    pthread_mutex_lock(&w->lock);
+    for (uint32_t i = 1; i < w->file_count; i++)
+        if (w->unflushed[i] > w->unflushed[most]) most = i;
+    uint64_t bytes = w->unflushed[most];
+    pthread_mutex_unlock(&w->lock);
+    return bytes == 0 || flush_file(w, most, err);
 }
 
 static bool hash_range(const mospt_writer *w, const mospt_node *node, uint64_t skip, uint64_t size,
@@ -336,18 +361,22 @@ static bool list_files(const state *s, mospt_metadata *m, mospt_err *err)
     return true;
 }
 
-static bool flush_files(const mospt_writer *w, const state *s, mospt_err *err)
+/* Of a file that nothing was written to since it was flushed, nothing is left to be flushed, unless
+ * it comes from the sink. */
+static bool flush_files(mospt_writer *w, const state *s, mospt_err *err)
 {
     if (w->sink != NULL && !mospt_sink_flush(w->sink, err)) return false;
-    for (uint32_t i = 0; i < s->file_count; i++)
-        if (fsync(w->fd[i]) != 0)
-            return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
-                                 PAYLOAD_NAME " cannot be flushed to the disk", i);
+    for (uint32_t i = 0; i < s->file_count; i++) {
+        pthread_mutex_lock(&w->lock);
+        bool is_clean = w->sink == NULL && w->unflushed[i] == 0;
+        pthread_mutex_unlock(&w->lock);
+        if (!is_clean && !flush_file(w, i, err)) return false;
+    }
     return true;
 }
 
 /* metadata  out: files, which it owns, and hierarchy; its hierarchy_name is given */
-static bool commit(const mospt_writer *w, state *s, mospt_metadata *m, mospt_err *err)
+static bool commit(mospt_writer *w, state *s, mospt_metadata *m, mospt_err *err)
 {
     if (!list_files(s, m, err) || !flush_files(w, s, err) ||
         !mospt_hierarchy_link(&s->hierarchy, &m->grid, err))
@@ -406,13 +435,17 @@ bool mospt_writer_commit_part(mospt_writer *w, const mospt_metadata *metadata, u
 }
 
 /* An unfinished build may have left more than the dataset has, and so may the sink. */
-static bool cut_files(const mospt_writer *w, const state *s, mospt_err *err)
+static bool cut_files(mospt_writer *w, const state *s, mospt_err *err)
 {
+    struct stat status;
     if (w->sink != NULL && !mospt_sink_flush(w->sink, err)) return false;
-    for (uint32_t i = 0; i < s->file_count; i++)
+    for (uint32_t i = 0; i < s->file_count; i++) {
+        if (fstat(w->fd[i], &status) == 0 && (uint64_t)status.st_size == s->size[i]) continue;
         if (ftruncate(w->fd[i], (off_t)s->size[i]) != 0)
             return mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
                                  PAYLOAD_NAME " cannot be cut", i);
+        w->unflushed[i]++;
+    }
     return true;
 }
 

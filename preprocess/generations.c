@@ -11,6 +11,11 @@
 #define SECONDS_MAX 1.0
 enum { REST = 50 };
 
+/* A disk takes as long for a flush as it has been given bytes since the last one, and nothing else
+ * meanwhile. So it is flushed often: no commit waits long, and least of all the last one, when
+ * there is nothing else left to be done. */
+#define FLUSH_SECONDS 0.04
+
 struct prep_generations {
     mospt_writer *writer;
     const mospt_metadata *metadata;
@@ -45,11 +50,28 @@ static bool wait_until(prep_generations *g, double when)
     return goes_on;
 }
 
+static double now(void)
+{
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+/* Returns false where that is to end for good, by a failure or because the build has ended. */
+static bool flush_until(prep_generations *g, double when)
+{
+    for (;;) {
+        double next = now() + FLUSH_SECONDS;
+        if (!wait_until(g, next < when ? next : when)) return false;
+        if (now() >= when) return true;
+        g->failed = !mospt_writer_flush(g->writer, &g->err);
+        if (g->failed) return false;
+    }
+}
+
 static void *run(void *context)
 {
     prep_generations *g = context;
     double interval = FIRST_SECONDS;
-    while (!g->failed && wait_until(g, read_clock(CLOCK_MONOTONIC) + interval)) {
+    while (!g->failed && flush_until(g, now() + interval)) {
         double start = read_clock(CLOCK_THREAD_CPUTIME_ID);
         g->failed = !mospt_writer_commit_part(g->writer, g->metadata, g->build, &g->err);
         double least = REST * (read_clock(CLOCK_THREAD_CPUTIME_ID) - start);
