@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 /* What disks and file systems ask of direct writing; chunks that wait for the thread. */
-enum { ALIGNMENT = 4096, WAITING_MAX = 4 };
+enum { ALIGNMENT = 4096, WAITING_MAX = 32 };
 
 typedef struct chunk {
     struct chunk *next;

@@ -12,7 +12,7 @@ enum {
     MOSPT_SINK_CHUNK_MAX = 2 << 20,
     MOSPT_SINK_FILES_MAX = 64,
     MOSPT_SINK_CHUNKS =
-        24, /* that are usually in memory: one or two a file, and those on their way */
+        48, /* that are usually in memory: one or two a file, and those on their way */
 };
 
 typedef struct mospt_sink mospt_sink;
