@@ -1,5 +1,6 @@
 #include "preprocess/solve.h"
 
+#include "mospt/wide.h"
 #include "preprocess/sort.h"
 
 #include <stdlib.h>
@@ -8,6 +9,8 @@ enum {
     OCTANTS = 8,
     PIECES_MAX = OCTANTS * OCTANTS,
     SHARED_MIN = 1 << 18, /* points that all threads divide together */
+    RUN_BITS = 8,
+    RUN = 1 << RUN_BITS, /* points that are divided at a time */
 };
 
 /* Keys go back and forth between two arrays: what a node keeps stays where it was put, and what it
@@ -147,24 +150,95 @@ static uint32_t count_rejected(const uint64_t *keys, uint32_t count, uint32_t ce
     return sum;
 }
 
+/* Where keys go. */
+typedef struct {
+    uint64_t *kept, *rejected;
+} exits;
+
+/* The points of one cell: the first that arrived is kept, and the others are rejected, in their
+ * order. */
+static void reject_cell(const uint64_t *keys, uint32_t count, uint64_t index_mask, exits *to)
+{
+    uint32_t first = 0;
+    for (uint32_t i = 1; i < count; i++)
+        if ((keys[i] & index_mask) < (keys[first] & index_mask)) first = i;
+    *to->kept++ = keys[first];
+    memcpy(to->rejected, keys, first * sizeof *keys);
+    memcpy(to->rejected + first, keys + first + 1, (count - 1 - first) * sizeof *keys);
+    to->rejected += count - 1;
+}
+
+/* What is told of each key without looking at others than the one before it. */
+typedef struct {
+    uint64_t begins[RUN]; /* all bits: it is the first of its cell; else none */
+    uint64_t rival[RUN];  /* its index, above where it is */
+} signs;
+
+MOSPT_WIDE static void read_signs(const uint64_t *restrict keys, uint32_t count,
+                                  uint32_t cell_shift, uint64_t index_mask, signs *restrict out)
+{
+    for (uint32_t i = 0; i < count; i++)
+        out->rival[i] = (keys[i] & index_mask) << RUN_BITS | i;
+    out->begins[0] = 0;
+    for (uint32_t i = 1; i < count; i++)
+        out->begins[i] = keys[i] >> cell_shift != keys[i - 1] >> cell_shift ? UINT64_MAX : 0;
+}
+
+/* The same for whole cells with `count` points, at most RUN. Cells have a few points each: how
+ * many, and which of them came first, no processor can foretell, so none of that is a branch. */
+static void reject_run(const uint64_t *keys, uint32_t count, uint32_t cell_shift,
+                       uint64_t index_mask, exits *to)
+{
+    signs of;
+    uint64_t first[RUN], rejected[RUN + 1], earliest = UINT64_MAX;
+    bool is_kept[RUN] = {false};
+    uint32_t cell = 0, n = 0;
+    read_signs(keys, count, cell_shift, index_mask, &of);
+    for (uint32_t i = 0; i < count; i++) {
+        earliest |= of.begins[i];
+        earliest = of.rival[i] < earliest ? of.rival[i] : earliest;
+        cell -= (uint32_t)of.begins[i];
+        first[cell] = earliest;
+    }
+    for (uint32_t c = 0; c <= cell; c++) {
+        uint32_t i = (uint32_t)first[c] & (RUN - 1);
+        is_kept[i] = true;
+        to->kept[c] = keys[i];
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        rejected[n] = keys[i];
+        n += !is_kept[i];
+    }
+    memcpy(to->rejected, rejected, n * sizeof *rejected);
+    to->kept += cell + 1;
+    to->rejected += n;
+}
+
+/* How many of the first keys are whole cells, at most RUN; 0: the first cell has more points. */
+static uint32_t run_of_cells(const uint64_t *keys, uint32_t count, uint32_t cell_shift)
+{
+    if (count <= RUN) return count;
+    uint32_t end = RUN;
+    while (end > 0 && (keys[end] ^ keys[end - 1]) >> cell_shift == 0)
+        end--;
+    return end;
+}
+
 /* Sends the first point that arrived in each cell to `kept`, and the others, in their order, to
  * `rejected`. */
 static void reject(const solver *s, const uint64_t *keys, uint32_t count, uint32_t cell_shift,
-                   uint64_t *kept, uint64_t *rejected)
+                   exits to)
 {
-    for (uint32_t a = 0, b; a < count; a = b) {
-        uint64_t cell = keys[a] >> cell_shift, first_key = keys[a];
-        uint32_t first = a;
-        for (b = a + 1; b < count && keys[b] >> cell_shift == cell; b++) {
-            bool earlier = index_of(s, keys[b]) < index_of(s, first_key);
-            first = earlier ? b : first;
-            first_key = earlier ? keys[b] : first_key;
+    uint64_t index_mask = (UINT64_C(1) << s->sorter.index_bits) - 1;
+    for (uint32_t i = 0, n; i < count; i += n) {
+        n = run_of_cells(keys + i, count - i, cell_shift);
+        if (n > 0) {
+            reject_run(keys + i, n, cell_shift, index_mask, &to);
+            continue;
         }
-        *kept++ = first_key;
-        for (uint32_t i = a; i < first; i++)
-            *rejected++ = keys[i];
-        for (uint32_t i = first + 1; i < b; i++)
-            *rejected++ = keys[i];
+        for (n = RUN; i + n < count && (keys[i + n] ^ keys[i]) >> cell_shift == 0;)
+            n++;
+        reject_cell(keys + i, n, index_mask, &to);
     }
 }
 
@@ -223,7 +297,7 @@ static void move_piece(void *context, uint32_t piece)
              *rest = room + d->kept + d->rest_at[piece];
     uint32_t count = d->begin[piece + 1] - d->begin[piece];
     if (d->rejected[piece / d->pieces_per_octant] > 0)
-        reject(d->s, keys, count, d->cell_shift, kept, rest);
+        reject(d->s, keys, count, d->cell_shift, (exits){kept, rest});
     else memcpy(kept, keys, count * sizeof *keys);
 }
 
