@@ -5,6 +5,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 /* A square picture with a field of view of 90 degrees: at a distance of SIDE / 2 * k steps a pixel
  * is k steps wide. */
@@ -365,6 +366,80 @@ static void lighting_sees_the_mean_depth_of_what_is_blended(void **unused)
     teardown(&s);
 }
 
+/* Through the ring several times, to the same place: each picture has the points of its own time.
+ */
+static void uploads_are_seen_by_what_is_drawn_after_them(void **unused)
+{
+    (void)unused;
+    stand s;
+    setup(&s);
+    fill_plane(&s, 16, 0, RED);
+    for (int round = 0; round < 1200; round++) { /* of 64 KiB */
+        const uint8_t rgb[3] = {(uint8_t)round, (uint8_t)(round / 5), 77};
+        for (uint32_t i = 0; i < s.count; i++)
+            memcpy(&s.points[i].r, rgb, sizeof rgb);
+        upload(&s);
+        draw_part(&s, 0, s.count, RGL_BEGIN | RGL_END);
+        if (round % 97 > 0) continue;
+        read_back(&s);
+        assert_int_equal(count_of(&s, rgb), PIXELS);
+    }
+    teardown(&s);
+}
+
+static void an_upload_larger_than_the_ring_arrives(void **unused)
+{
+    (void)unused;
+    enum { REPEATS = 600, MANY = REPEATS * PIXELS }; /* 37.5 MiB */
+    stand s;
+    mospt_err err = {0};
+    setup(&s);
+    mospt_vertex *many = malloc(MANY * sizeof *many);
+    fill_plane(&s, 16, 0, RED);
+    for (int r = 0; r < REPEATS; r++) {
+        memcpy(many + (size_t)r * PIXELS, s.points, PIXELS * sizeof *many);
+        for (int p = 0; p < PIXELS; p++)
+            many[r * PIXELS + p].g = (uint8_t)r, many[r * PIXELS + p].b = (uint8_t)(r >> 8);
+    }
+    CORE_NEED(rgl_arena_create(s.gl, MANY + 5, &err));
+    CORE_NEED(rgl_arena_upload(s.gl, 5, many, MANY, &err));
+    for (int r = 0; r < REPEATS; r += 37) {
+        const uint8_t rgb[3] = {RED[0], (uint8_t)r, (uint8_t)(r >> 8)};
+        draw_part(&s, 5 + (uint32_t)r * PIXELS, 5 + (uint32_t)(r + 1) * PIXELS,
+                  RGL_BEGIN | RGL_END);
+        read_back(&s);
+        assert_int_equal(count_of(&s, rgb), PIXELS);
+    }
+    free(many);
+    teardown(&s);
+}
+
+/* No memory for the arena is no end: a smaller one does. */
+static void an_arena_that_does_not_fit_can_be_made_smaller(void **unused)
+{
+    (void)unused;
+#ifdef __SANITIZE_ADDRESS__ /* which needs all the addresses there are */
+    skip();
+#endif
+    stand s;
+    mospt_err err = {0};
+    struct rlimit before, less;
+    setup(&s);
+    getrlimit(RLIMIT_AS, &before);
+    less = before;
+    less.rlim_cur = (rlim_t)16 << 30;
+    setrlimit(RLIMIT_AS, &less);
+    bool made = rgl_arena_create(s.gl, INT32_MAX, &err); /* 32 GiB */
+    setrlimit(RLIMIT_AS, &before);
+    assert_false(made);
+    assert_int_equal(err.code, MOSPT_ENOMEM);
+    CORE_NEED(rgl_arena_create(s.gl, MOST, &err));
+    fill_plane(&s, 16, 0, RED);
+    draw(&s);
+    assert_int_equal(count_of(&s, RED), PIXELS);
+    teardown(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -378,6 +453,9 @@ int main(void)
         cmocka_unit_test(the_background_goes_from_top_to_bottom),
         cmocka_unit_test(lighting_darkens_what_lies_behind_an_edge),
         cmocka_unit_test(lighting_sees_the_mean_depth_of_what_is_blended),
+        cmocka_unit_test(uploads_are_seen_by_what_is_drawn_after_them),
+        cmocka_unit_test(an_upload_larger_than_the_ring_arrives),
+        cmocka_unit_test(an_arena_that_does_not_fit_can_be_made_smaller),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -334,7 +334,9 @@ static void repainted_points_are_those_of_a_fresh_start(void **unused)
     (void)unused;
     render_site site;
     mospt_err err = {0};
-    const rend_limits limits[] = {{0}, {.ram_cache_bytes = 1}, {.budget_points = 1, .ram_cache_bytes = 1, .gpu_cache_bytes = 1}};
+    const rend_limits limits[] = {{0},
+                                  {.ram_cache_bytes = 1},
+                                  {.budget_points = 1, .ram_cache_bytes = 1, .gpu_cache_bytes = 1}};
     render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
     for (int l = 0; l < 3; l++) {
         scene s;

@@ -32,7 +32,8 @@ void rgl_canvas_fini(rgl_canvas *canvas)
     delete_layers(canvas);
     glDeleteProgram(canvas->resolve);
     glDeleteProgram(canvas->fill);
-    glDeleteProgram(canvas->shade);
+    glDeleteProgram(canvas->light);
+    glDeleteProgram(canvas->plain);
     glDeleteVertexArrays(1, &canvas->nothing);
 }
 
@@ -180,10 +181,10 @@ bool rgl_canvas_add(rgl_canvas *canvas, mospt_err *err)
 
 /* ---- passes over the screen ---- */
 
-static bool use_program(GLuint *program, const char *fragment, mospt_err *err)
+static bool use_program(GLuint *program, const char *defines, const char *fragment, mospt_err *err)
 {
     static const char *const units[] = {"colours", "depths", "nearest"};
-    if (*program == 0 && !rgl_program_create("", RGL_SCREEN_VERTEX, fragment, program, err))
+    if (*program == 0 && !rgl_program_create(defines, RGL_SCREEN_VERTEX, fragment, program, err))
         return false;
     GL(glUseProgram(*program));
     for (int u = 0; u < 3; u++)
@@ -225,7 +226,7 @@ static GLint uniform(GLuint program, const char *name)
 static bool resolve(rgl_canvas *c, const rgl_scene *scene, mospt_err *err)
 {
     if (!make_plain_layer(c, &c->resolved, err) ||
-        !use_program(&c->resolve, RGL_RESOLVE_FRAGMENT, err))
+        !use_program(&c->resolve, "", RGL_RESOLVE_FRAGMENT, err))
         return false;
     GL(glActiveTexture(GL_TEXTURE0 + RGL_CANVAS_NEAREST));
     GL(glBindTexture(GL_TEXTURE_2D, c->nearest.depths));
@@ -236,7 +237,7 @@ static bool resolve(rgl_canvas *c, const rgl_scene *scene, mospt_err *err)
 
 static bool fill(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, mospt_err *err)
 {
-    if (!make_plain_layer(c, &c->filled, err) || !use_program(&c->fill, RGL_FILL_FRAGMENT, err))
+    if (!make_plain_layer(c, &c->filled, err) || !use_program(&c->fill, "", RGL_FILL_FRAGMENT, err))
         return false;
     uint32_t radius = scene->fill_px < RGL_FILL_PX_MAX ? scene->fill_px : RGL_FILL_PX_MAX;
     GL(glUniform1i(uniform(c->fill, "radius"), (GLint)radius));
@@ -249,12 +250,14 @@ static bool fill(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, m
 static bool shade(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, GLuint to,
                   mospt_err *err)
 {
-    if (!use_program(&c->shade, RGL_SHADE_FRAGMENT, err)) return false;
-    GL(glUniform1f(uniform(c->shade, "span"), span_of(scene)));
-    GL(glUniform2f(uniform(c->shade, "edl"), scene->edl_strength, scene->edl_radius_px));
-    GL(glUniform3fv(uniform(c->shade, "top"), 1, scene->background_top));
-    GL(glUniform3fv(uniform(c->shade, "bottom"), 1, scene->background_bottom));
-    GL(glUniform1f(uniform(c->shade, "height"), (float)c->height));
+    bool edl = scene->edl_strength > 0;
+    GLuint *program = edl ? &c->light : &c->plain;
+    if (!use_program(program, edl ? "#define EDL\n" : "", RGL_SHADE_FRAGMENT, err)) return false;
+    GL(glUniform1f(uniform(*program, "span"), span_of(scene)));
+    GL(glUniform2f(uniform(*program, "edl"), scene->edl_strength, scene->edl_radius_px));
+    GL(glUniform3fv(uniform(*program, "top"), 1, scene->background_top));
+    GL(glUniform3fv(uniform(*program, "bottom"), 1, scene->background_bottom));
+    GL(glUniform1f(uniform(*program, "height"), (float)c->height));
     run_pass(c, from, to);
     return true;
 }

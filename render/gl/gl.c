@@ -2,6 +2,7 @@
 #include "render/gl/canvas.h"
 #include "render/gl/driver.h"
 #include "render/gl/program.h"
+#include "render/gl/staging.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -29,11 +30,12 @@ enum { OCTANTS_WIDTH = 1024 }; /* texels; the shader knows it too */
 typedef struct {
     rgl base;
     GLuint arena, arena_vao;
-    uint64_t arena_size;               /* vertices */
+    rgl_staging staging;
     points_program points[KIND_COUNT]; /* made at first use */
     rgl_canvas canvas;
     GLuint octants;
-    bool robust; /* the context tells when it is lost */
+    GLsizei octants_rows; /* that its texture has room for */
+    bool robust;          /* the context tells when it is lost */
     char renderer[128];
 } gl_rgl;
 
@@ -42,6 +44,7 @@ static void gl_destroy(rgl *gl)
     gl_rgl *g = (gl_rgl *)gl;
     rgl_canvas_fini(&g->canvas);
     glDeleteTextures(1, &g->octants);
+    rgl_staging_fini(&g->staging);
     glDeleteBuffers(1, &g->arena);
     glDeleteVertexArrays(1, &g->arena_vao);
     for (int k = 0; k < KIND_COUNT; k++)
@@ -71,6 +74,17 @@ static bool is_healthy(const gl_rgl *g, const char *what, mospt_err *err)
     return true;
 }
 
+static void set_vertex_format(const gl_rgl *g)
+{
+    GL(glBindVertexArray(g->arena_vao));
+    GL(glEnableVertexAttribArray(0));
+    GL(glEnableVertexAttribArray(1));
+    GL(glVertexAttribIPointer(0, 3, GL_UNSIGNED_INT, sizeof(mospt_vertex), NULL));
+    GL(glVertexAttribPointer(1, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(mospt_vertex),
+                             (const void *)offsetof(mospt_vertex, r)));
+}
+
+/* On failure there is none; a smaller one may be tried. */
 static bool gl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
@@ -78,16 +92,16 @@ static bool gl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "a GPU cache of %llu points is more than the %d that can be addressed",
                              (unsigned long long)vertex_count, INT32_MAX);
-    GL(glBindVertexArray(g->arena_vao));
+    GLsizeiptr size = (GLsizeiptr)((vertex_count > 0 ? vertex_count : 1) * sizeof(mospt_vertex));
+    glDeleteBuffers(1, &g->arena); /* first: there may not be room for both */
+    g->arena = 0;
+    if (!is_healthy(g, "the time before the GPU cache", err)) return false;
+    GL(glGenBuffers(1, &g->arena));
     GL(glBindBuffer(GL_ARRAY_BUFFER, g->arena));
-    GL(glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(vertex_count * sizeof(mospt_vertex)), NULL,
-                    GL_DYNAMIC_DRAW));
-    GL(glEnableVertexAttribArray(0));
-    GL(glEnableVertexAttribArray(1));
-    GL(glVertexAttribIPointer(0, 3, GL_UNSIGNED_INT, sizeof(mospt_vertex), NULL));
-    GL(glVertexAttribPointer(1, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(mospt_vertex),
-                             (const void *)offsetof(mospt_vertex, r)));
-    g->arena_size = vertex_count;
+    if (rgl_staging_is_mapped()) GL(glBufferStorage(GL_ARRAY_BUFFER, size, NULL, 0));
+    else GL(glBufferData(GL_ARRAY_BUFFER, size, NULL, GL_DYNAMIC_DRAW));
+    if (!is_healthy(g, "the GPU cache", err)) return false;
+    set_vertex_format(g);
     return is_healthy(g, "the GPU cache", err);
 }
 
@@ -96,10 +110,9 @@ static bool gl_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertice
 {
     gl_rgl *g = (gl_rgl *)gl;
     if (count == 0) return true;
-    GL(glBindBuffer(GL_ARRAY_BUFFER, g->arena));
-    GL(glBufferSubData(GL_ARRAY_BUFFER, (GLintptr)(first * sizeof *vertices),
-                       (GLsizeiptr)(count * sizeof *vertices), vertices));
-    return is_healthy(g, "an upload", err);
+    return rgl_staging_upload(&g->staging, g->arena, first * sizeof *vertices, vertices,
+                              count * sizeof *vertices, err) &&
+           is_healthy(g, "an upload", err);
 }
 
 static bool make_points_program(int kind, points_program *out, mospt_err *err)
@@ -169,8 +182,11 @@ static void upload_octants(gl_rgl *g, const rgl_scene *scene)
     GL(glActiveTexture(GL_TEXTURE0));
     GL(glBindTexture(GL_TEXTURE_2D, g->octants));
     GL(glPixelStorei(GL_UNPACK_ALIGNMENT, 4));
-    GL(glTexImage2D(GL_TEXTURE_2D, 0, GL_R32UI, OCTANTS_WIDTH, rows + 1, 0, GL_RED_INTEGER,
-                    GL_UNSIGNED_INT, NULL));
+    if (rows >= g->octants_rows) { /* twice what is needed: this is rare */
+        g->octants_rows = 2 * (rows + 1);
+        GL(glTexImage2D(GL_TEXTURE_2D, 0, GL_R32UI, OCTANTS_WIDTH, g->octants_rows, 0,
+                        GL_RED_INTEGER, GL_UNSIGNED_INT, NULL));
+    }
     if (rows > 0)
         GL(glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, OCTANTS_WIDTH, rows, GL_RED_INTEGER,
                            GL_UNSIGNED_INT, scene->octants));
@@ -334,7 +350,6 @@ bool rgl_gl_create(rgl **out, mospt_err *err)
     while (glGetError() != GL_NO_ERROR) {
     }
     glGenVertexArrays(1, &g->arena_vao);
-    glGenBuffers(1, &g->arena);
     g->octants = make_octants_texture();
     rgl_canvas_init(&g->canvas);
     *out = &g->base;
