@@ -45,8 +45,8 @@ static GLuint make_texture(const rgl_canvas *c, GLint format, GLenum layout, GLe
     GL(glGenTextures(1, &texture));
     GL(glActiveTexture(GL_TEXTURE0));
     GL(glBindTexture(GL_TEXTURE_2D, texture));
-    GL(glTexImage2D(GL_TEXTURE_2D, 0, format, (GLsizei)c->width, (GLsizei)c->height, 0, layout,
-                    type, NULL));
+    glTexImage2D(GL_TEXTURE_2D, 0, format, (GLsizei)c->width, (GLsizei)c->height, 0, layout, type,
+                 NULL);
     GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
     GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
     return texture;

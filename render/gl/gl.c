@@ -98,8 +98,8 @@ static bool gl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
     if (!is_healthy(g, "the time before the GPU cache", err)) return false;
     GL(glGenBuffers(1, &g->arena));
     GL(glBindBuffer(GL_ARRAY_BUFFER, g->arena));
-    if (rgl_staging_is_mapped()) GL(glBufferStorage(GL_ARRAY_BUFFER, size, NULL, 0));
-    else GL(glBufferData(GL_ARRAY_BUFFER, size, NULL, GL_DYNAMIC_DRAW));
+    if (rgl_staging_is_mapped()) glBufferStorage(GL_ARRAY_BUFFER, size, NULL, 0);
+    else glBufferData(GL_ARRAY_BUFFER, size, NULL, GL_DYNAMIC_DRAW);
     if (!is_healthy(g, "the GPU cache", err)) return false;
     set_vertex_format(g);
     return is_healthy(g, "the GPU cache", err);

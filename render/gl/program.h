@@ -18,8 +18,8 @@ extern const char RGL_TEXT_VERTEX[], RGL_TEXT_FRAGMENT[];
 #ifdef NDEBUG
 #define GL(call) call
 #else
-/* Stops at our own mistakes; running out of memory is the caller's to handle and is left for its
- * glGetError(). */
+/* Stops at our own mistakes. Calls that may run out of memory go without it: that is theirs to
+ * handle, by glGetError(), which tells only once. */
 void rgl_check(const char *call, const char *file, int line);
 #define GL(call)                                                                                   \
     do {                                                                                           \

@@ -27,7 +27,7 @@ static void make_ring(rgl_staging *s)
     GL(glGenBuffers(1, &s->buffer));
     if (!rgl_staging_is_mapped()) return;
     GL(glBindBuffer(GL_COPY_READ_BUFFER, s->buffer));
-    GL(glBufferStorage(GL_COPY_READ_BUFFER, (GLsizeiptr)RING_SIZE, NULL, flags));
+    glBufferStorage(GL_COPY_READ_BUFFER, (GLsizeiptr)RING_SIZE, NULL, flags);
     if (glGetError() == GL_NO_ERROR)
         s->memory = glMapBufferRange(GL_COPY_READ_BUFFER, 0, (GLsizeiptr)RING_SIZE, flags);
 }
