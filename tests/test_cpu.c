@@ -77,20 +77,34 @@ typedef struct {
     float depths[PIXELS];
 } picture;
 
-/* Draws all points in so many calls. */
+/* Draws all points in so many calls.
+ * first, all, last     parts of the first of them, of all, and of the last */
+static void draw_calls(rgl *gl, const rgl_scene *scene, rgl_shape shape, int32_t calls, int first,
+                       int all, int last)
+{
+    mospt_err err = {0};
+    for (int32_t c = 0; c < calls; c++) {
+        int32_t from[2] = {POINTS / calls * c, 0}, count[2] = {POINTS / calls, 0};
+        if (c == calls - 1) count[0] = POINTS - from[0];
+        count[1] = count[0] / 3, from[1] = from[0] + count[0] - count[1], count[0] -= count[1];
+        rgl_batch batch = {.shape = shape, .first = from, .count = count, .range_count = 2};
+        int parts = all | (c == 0 ? first : 0) | (c == calls - 1 ? last : 0);
+        CORE_NEED(rgl_draw(gl, scene, &batch, 1, parts, &err));
+    }
+}
+
 static void draw_in(rgl *gl, const rgl_scene *scene, const mospt_vertex *v, rgl_shape shape,
                     int32_t calls, picture *out)
 {
     mospt_err err = {0};
+    bool blend = scene->blend_slab > 0;
     CORE_NEED(rgl_arena_create(gl, POINTS, &err));
     CORE_NEED(rgl_arena_upload(gl, 0, v, POINTS, &err));
-    for (int32_t c = 0; c < calls; c++) {
-        int32_t first[2] = {POINTS / calls * c, 0}, count[2] = {POINTS / calls, 0};
-        if (c == calls - 1) count[0] = POINTS - first[0];
-        count[1] = count[0] / 3, first[1] = first[0] + count[0] - count[1], count[0] -= count[1];
-        rgl_batch batch = {.shape = shape, .first = first, .count = count, .range_count = 2};
-        int parts = (c == 0 ? RGL_BEGIN : 0) | (c == calls - 1 ? RGL_END : 0);
-        CORE_NEED(rgl_draw(gl, scene, &batch, 1, parts, &err));
+    if (blend && calls > 1) {
+        draw_calls(gl, scene, shape, calls, RGL_BEGIN, 0, 0);
+        draw_calls(gl, scene, shape, calls, 0, RGL_AGAIN, RGL_END);
+    } else {
+        draw_calls(gl, scene, shape, calls, RGL_BEGIN | (blend ? RGL_AGAIN : 0), 0, RGL_END);
     }
     CORE_NEED(rgl_read_pixels(gl, false, WIDTH, HEIGHT, out->rgb, &err));
     CORE_NEED(rgl_read_depths(gl, out->depths, &err));
@@ -135,7 +149,8 @@ typedef struct {
     const char *name;
     bool octants, clip;
     rgl_shape shape;
-    float size, least, most, edl, radius;
+    float size, least, most, edl, radius, slab;
+    uint32_t fill;
 } size_case;
 
 static const size_case SIZES[] = {
@@ -149,6 +164,13 @@ static const size_case SIZES[] = {
     {"bent", .octants = true, .shape = RGL_PARABOLOID, .least = 1, .most = 16},
     {"clipped", .clip = true, .least = 1, .most = 1, .edl = 24, .radius = 1},
     {"clipped discs", .clip = true, .shape = RGL_ROUND, .least = 5, .most = 5},
+    {"blended", .least = 1, .most = 1, .slab = 0.02f, .edl = 24, .radius = 1},
+    {"blended cells", .octants = true, .least = 1, .most = 6, .slab = 0.01f},
+    {"blended discs", .octants = true, .shape = RGL_ROUND, .least = 3, .most = 9, .slab = 0.05f},
+    {"blended, bent", .shape = RGL_PARABOLOID, .least = 7, .most = 7, .slab = 0.02f},
+    {"filled", .least = 1, .most = 1, .fill = 2},
+    {"filled widely", .least = 2, .most = 2, .fill = 8, .edl = 24, .radius = 2},
+    {"blended and filled", .least = 2, .most = 2, .slab = 0.02f, .fill = 3, .edl = 24, .radius = 1},
     {"large squares", .least = 40, .most = 40, .edl = 24, .radius = 1},
 };
 
@@ -170,6 +192,7 @@ static rgl_scene scene_of(const size_case *c, look_kind look, const uint32_t at[
     scene.splat_scale = 1.25f, scene.splat_size = c->size;
     scene.px_min = c->least, scene.px_max = c->most;
     scene.edl_strength = c->edl, scene.edl_radius_px = c->radius;
+    scene.blend_slab = c->slab, scene.fill_px = c->fill;
     return scene;
 }
 

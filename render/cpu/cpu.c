@@ -10,8 +10,7 @@
 #include <stdlib.h>
 
 enum {
-    CHUNK_POINTS = 8192, /* 128 KiB of vertices: a fifth of a millisecond */
-    ROWS_PER_JOB = 8,
+    CHUNK_POINTS = 8192,   /* 128 KiB of vertices: a fifth of a millisecond */
     EDL_RADIUS_MAX = 1024, /* pixels */
 };
 
@@ -100,6 +99,8 @@ static rcpu_view make_view(const cpu_rgl *c, const rgl_scene *scene)
         .octants = scene->octants != NULL ? c->octants : NULL,
         .grid_bits = scene->grid_bits,
         .square_px = RGL_SQUARE_PX,
+        .slab = scene->blend_slab,
+        .slab_log = log2f(1 + scene->blend_slab),
     };
     if (scene->clip != NULL) {
         v.has_clip = true;
@@ -178,66 +179,80 @@ static void draw_chunk(void *user, uint32_t worker, uint32_t job)
     cpu_rgl *c = round->c;
     const chunk *part = &c->chunks[job];
     rcpu_view view = view_of(round, &round->batches[part->batch]);
-    c->frames.dirty[worker] = true;
+    c->frames.drawn[worker] = true;
     (view.px_max <= 1 ? c->kernel->points : c->kernel->splats)(&view, part->vertices, part->count,
                                                                c->frames.frames[worker]);
 }
 
-static bool draw_points(cpu_rgl *c, const rgl_scene *scene, const rgl_batch *batches,
-                        uint32_t batch_count, mospt_err *err)
+static void blend_chunk(void *user, uint32_t worker, uint32_t job)
 {
-    if (!cut_batches(c, batches, batch_count, err)) return false;
+    const points_round *round = user;
+    cpu_rgl *c = round->c;
+    const chunk *part = &c->chunks[job];
+    rcpu_view view = view_of(round, &round->batches[part->batch]);
+    c->kernel->blend(&view, part->vertices, part->count, c->frames.frames[0],
+                     c->frames.sums[worker]);
+}
+
+static bool draw_points(cpu_rgl *c, const rgl_scene *scene, const rgl_batch *batches, int parts,
+                        mospt_err *err)
+{
+    rcpu_frames *f = &c->frames;
     points_round round = {c, make_view(c, scene), 1 / (2 * scene->frame.focal_px), batches};
-    rcpu_threads_run(c->threads, c->frames.frame_count, (uint32_t)c->chunk_count, draw_chunk,
-                     &round);
+    uint32_t chunks = (uint32_t)c->chunk_count;
+    bool begin = (parts & RGL_BEGIN) != 0, again = (parts & RGL_AGAIN) != 0;
+    if (begin || !again) {
+        if (begin) rcpu_frames_clear(f, c->threads);
+        if (chunks > 0) f->merged = false;
+        rcpu_threads_run(c->threads, f->frame_count, chunks, draw_chunk, &round);
+    }
+    if (again) {
+        rcpu_frames_merge(f, c->kernel, c->threads);
+        if (!f->blending && !rcpu_frames_blend(f, c->threads, err)) return false;
+        rcpu_threads_run(c->threads, f->sums_count, chunks, blend_chunk, &round);
+    }
     return true;
 }
 
 /* ---- shading ---- */
 
-typedef struct {
-    cpu_rgl *c;
-    rcpu_light light;
-} shade_round;
-
 static rcpu_light make_light(const cpu_rgl *c, const rgl_scene *scene)
 {
     rcpu_light light = {
         .size = c->frames.size,
-        .log_stride = c->frames.log_stride,
         .edl_strength = scene->edl_strength,
         .straight = (int)(scene->edl_radius_px + 0.5f),
         .diagonal = (int)(0.7071f * scene->edl_radius_px + 0.5f),
     };
+    if (light.straight > EDL_RADIUS_MAX) light.straight = EDL_RADIUS_MAX;
+    if (light.diagonal > EDL_RADIUS_MAX) light.diagonal = EDL_RADIUS_MAX;
     memcpy(light.background_top, scene->background_top, sizeof light.background_top);
     memcpy(light.background_bottom, scene->background_bottom, sizeof light.background_bottom);
     return light;
 }
 
-static void shade_rows(void *user, uint32_t worker, uint32_t job)
+static rcpu_hole make_hole(const cpu_rgl *c, const rgl_scene *scene)
 {
-    (void)worker;
-    const shade_round *round = user;
-    const rcpu_frames *f = &round->c->frames;
-    uint32_t end = (job + 1) * ROWS_PER_JOB;
-    if (end > f->size.height) end = f->size.height;
-    for (uint32_t y = job * ROWS_PER_JOB; y < end; y++)
-        round->c->kernel->shade(&round->light, y, f->frames[0], rcpu_frames_logs(f),
-                                f->picture + (size_t)y * f->size.stride);
+    uint32_t radius = scene->fill_px < RGL_FILL_PX_MAX ? scene->fill_px : RGL_FILL_PX_MAX;
+    return (rcpu_hole){.size = c->frames.size,
+                       .radius = (int)radius,
+                       .behind_log = log2f(1 + RGL_FILL_BEHIND),
+                       .spread_log = log2f(1 + RGL_FILL_SPREAD),
+                       .far_log = log2f(scene->frame.far_w)};
 }
 
-static void shade(cpu_rgl *c, const rgl_scene *scene)
+static bool finish(cpu_rgl *c, const rgl_scene *scene, mospt_err *err)
 {
-    shade_round round = {c, make_light(c, scene)};
-    rcpu_frames_merge(&c->frames, c->kernel, c->threads);
-    rcpu_threads_run(c->threads, 0, (c->frames.size.height + ROWS_PER_JOB - 1) / ROWS_PER_JOB,
-                     shade_rows, &round);
+    rcpu_light light = make_light(c, scene);
+    rcpu_hole hole = make_hole(c, scene);
+    return rcpu_frames_finish(&c->frames, c->kernel, c->threads, &light, &hole,
+                              log2f(1 + scene->blend_slab), err);
 }
 
 static uint32_t margin_for(const rgl_scene *scene)
 {
-    float radius = scene->edl_strength > 0 ? scene->edl_radius_px : 0;
-    return (uint32_t)(fminf(radius, EDL_RADIUS_MAX) + 1);
+    float radius = scene->edl_strength > 0 ? fminf(scene->edl_radius_px, EDL_RADIUS_MAX) : 0;
+    return (uint32_t)fmaxf(radius, RGL_FILL_PX_MAX) + 1;
 }
 
 static bool cpu_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
@@ -248,15 +263,11 @@ static bool cpu_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
     if (!rcpu_frames_fit(&c->frames, f->width, f->height, margin_for(scene),
                          rcpu_threads_count(c->threads), err))
         return false;
-    if (parts & RGL_BEGIN) {
-        rcpu_frames_clear(&c->frames, c->threads);
-        if (!take_octants(c, scene, err)) return false;
-    }
-    c->frames.merged = c->frames.merged && batch_count == 0;
-    if (!draw_points(c, scene, batches, batch_count, err)) return false;
+    if (parts & RGL_BEGIN && !take_octants(c, scene, err)) return false;
+    if (!cut_batches(c, batches, batch_count, err) || !draw_points(c, scene, batches, parts, err))
+        return false;
     c->near_log = log2f(f->near_w), c->range_log = log2f(f->far_w / f->near_w);
-    if (parts & RGL_END) shade(c, scene);
-    return true;
+    return !(parts & RGL_END) || finish(c, scene, err);
 }
 
 /* ---- reading ---- */
@@ -291,7 +302,8 @@ static float depth_at(const cpu_rgl *c, int x, int y)
 {
     const rcpu_frames *f = &c->frames;
     if (x < 0 || y < 0 || x >= (int)f->size.width || y >= (int)f->size.height) return 1;
-    float log = rcpu_frames_logs(f)[(size_t)y * f->log_stride + (size_t)x];
+    const rcpu_layer *l = &f->points;
+    float log = l->logs[(size_t)y * l->stride + l->margin + (size_t)x];
     return log == RCPU_SKY
                ? 1
                : fminf(fmaxf((log - c->near_log) / c->range_log, 0), DEPTH_OF_POINT_MAX);

@@ -2,11 +2,14 @@
 
 #include "render/cpu/memory.h"
 
-#include <assert.h>
 #include <string.h>
 
-enum { SPARE = 16, ROWS_PER_JOB = 8, SIZE_MAX_PX = 16384 };
-/* Of all frames together; a picture that needs more is drawn by fewer threads. */
+enum {
+    SPARE = 16, /* vectors reach beyond the end */
+    ROWS_PER_JOB = 8,
+    SIZE_MAX_PX = 16384,
+};
+/* Of all frames together, and of all sums; a picture that needs more is drawn by fewer threads. */
 #define FRAMES_BYTES_MAX ((size_t)1 << 30)
 
 static size_t pixels_of(const rcpu_frames *f)
@@ -19,9 +22,9 @@ static size_t frame_size(const rcpu_frames *f)
     return (pixels_of(f) + SPARE) * sizeof(int64_t);
 }
 
-static size_t logs_size(const rcpu_frames *f)
+static size_t sums_size(const rcpu_frames *f)
 {
-    return ((size_t)f->log_stride * f->size.height + SPARE) * sizeof *f->logs;
+    return pixels_of(f) * sizeof(rcpu_sums);
 }
 
 static size_t picture_size(const rcpu_frames *f)
@@ -29,19 +32,42 @@ static size_t picture_size(const rcpu_frames *f)
     return (pixels_of(f) + SPARE) * sizeof *f->picture;
 }
 
+/* Of logarithms, or of colours. */
+static size_t layer_size(const rcpu_frames *f)
+{
+    size_t stride = f->size.stride + 2 * f->margin;
+    return (stride * f->size.height + SPARE) * sizeof(float);
+}
+
+/* ---- memory ---- */
+
+static bool make_layer(const rcpu_frames *f, rcpu_layer *layer, mospt_err *err)
+{
+    if (layer->logs != NULL && layer->colours != NULL) return true;
+    layer->stride = f->size.stride + 2 * f->margin, layer->margin = f->margin;
+    if (layer->logs == NULL) layer->logs = rcpu_memory_take(layer_size(f));
+    if (layer->colours == NULL) layer->colours = rcpu_memory_take(layer_size(f));
+    return (layer->logs != NULL && layer->colours != NULL) ||
+           mospt_err_nomem(err, 2 * layer_size(f));
+}
+
+static void release_layer(const rcpu_frames *f, rcpu_layer *layer)
+{
+    rcpu_memory_release(layer->logs, layer_size(f));
+    rcpu_memory_release(layer->colours, layer_size(f));
+}
+
 void rcpu_frames_fini(rcpu_frames *frames)
 {
     for (uint32_t i = 0; i < frames->frame_count; i++)
         rcpu_memory_release(frames->frames[i], frame_size(frames));
-    rcpu_memory_release(frames->logs, logs_size(frames));
+    for (uint32_t i = 0; i < frames->sums_count; i++)
+        rcpu_memory_release(frames->sums[i], sums_size(frames));
+    release_layer(frames, &frames->points);
+    release_layer(frames, &frames->blended);
+    release_layer(frames, &frames->filled);
     rcpu_memory_release(frames->picture, picture_size(frames));
     *frames = (rcpu_frames){0};
-}
-
-static void empty(int64_t *pixels, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        pixels[i] = RCPU_EMPTY;
 }
 
 static uint32_t round_up(uint32_t value, uint32_t unit)
@@ -49,26 +75,31 @@ static uint32_t round_up(uint32_t value, uint32_t unit)
     return (value + unit - 1) / unit * unit;
 }
 
+/* How many of this size there may be. */
+static uint32_t count_for(size_t size, uint32_t threads)
+{
+    size_t most = FRAMES_BYTES_MAX / size;
+    uint32_t count = most < 1 ? 1 : most < threads ? (uint32_t)most : threads;
+    return count < RCPU_FRAMES_MAX ? count : RCPU_FRAMES_MAX;
+}
+
 static bool make(rcpu_frames *f, uint32_t width, uint32_t height, uint32_t margin, uint32_t threads,
                  mospt_err *err)
 {
     f->size = (rcpu_size){.width = width, .height = height};
     f->size.stride = round_up(width, 16);
-    if (f->size.stride % 32 == 0) f->size.stride += 16; /* in logarithms and colours, too, a line */
+    if (f->size.stride % 32 == 0) f->size.stride += 16;
     f->margin = round_up(margin, 16);
-    f->log_stride = f->size.stride + 2 * f->margin;
-    size_t most = FRAMES_BYTES_MAX / frame_size(f);
-    uint32_t count = most < 1 ? 1 : most < threads ? (uint32_t)most : threads;
-    if (count > RCPU_FRAMES_MAX) count = RCPU_FRAMES_MAX;
-    f->logs = rcpu_memory_take(logs_size(f));
     f->picture = rcpu_memory_take(picture_size(f));
-    bool ok = f->logs != NULL && f->picture != NULL;
-    for (; ok && f->frame_count < count; f->frame_count++) {
-        f->frames[f->frame_count] = rcpu_memory_take(frame_size(f));
-        if (f->frames[f->frame_count] == NULL) return mospt_err_nomem(err, frame_size(f));
-        f->dirty[f->frame_count] = true;
+    if (f->picture == NULL) return mospt_err_nomem(err, picture_size(f));
+    if (!make_layer(f, &f->points, err)) return false;
+    for (uint32_t count = count_for(frame_size(f), threads); f->frame_count < count;) {
+        int64_t *frame = rcpu_memory_take(frame_size(f));
+        if (frame == NULL) return mospt_err_nomem(err, frame_size(f));
+        f->drawn[f->frame_count] = true;
+        f->frames[f->frame_count++] = frame;
     }
-    return ok || mospt_err_nomem(err, logs_size(f) + picture_size(f));
+    return true;
 }
 
 bool rcpu_frames_fit(rcpu_frames *frames, uint32_t width, uint32_t height, uint32_t margin,
@@ -86,14 +117,18 @@ bool rcpu_frames_fit(rcpu_frames *frames, uint32_t width, uint32_t height, uint3
     return false;
 }
 
-/* ---- jobs: some rows of all frames ---- */
+/* ---- passes: each job is some rows ---- */
 
 typedef struct {
     rcpu_frames *frames;
     const rcpu_kernel *kernel;
-    int64_t *dirty[RCPU_FRAMES_MAX]; /* the first frame, and those that were drawn into */
-    uint32_t dirty_count;
-} round_of;
+    int64_t *drawn[RCPU_FRAMES_MAX]; /* the first frame, and those that were drawn into */
+    uint32_t drawn_count;
+    const rcpu_light *light;
+    const rcpu_hole *hole;
+    float slab_log;
+    const rcpu_layer *from, *to;
+} pass;
 
 static uint32_t job_count(const rcpu_frames *f)
 {
@@ -106,62 +141,152 @@ static uint32_t end_of(const rcpu_frames *f, uint32_t job)
     return end < f->size.height ? end : f->size.height;
 }
 
-static round_of start(rcpu_frames *f, const rcpu_kernel *kernel)
+static void run(pass *p, rcpu_threads *threads, rcpu_job *job)
 {
-    round_of r = {.frames = f, .kernel = kernel};
-    for (uint32_t i = 0; i < f->frame_count; i++)
-        if (i == 0 || f->dirty[i]) r.dirty[r.dirty_count++] = f->frames[i];
-    return r;
+    rcpu_threads_run(threads, 0, job_count(p->frames), job, p);
+}
+
+static void find_drawn(pass *p)
+{
+    for (uint32_t i = 0; i < p->frames->frame_count; i++)
+        if (i == 0 || p->frames->drawn[i]) p->drawn[p->drawn_count++] = p->frames->frames[i];
+}
+
+/* Repeats both ends of a row of logarithms. */
+static void extend(const rcpu_frames *f, const rcpu_layer *layer, uint32_t y)
+{
+    float *row = layer->logs + (size_t)y * layer->stride;
+    for (uint32_t i = 0; i < layer->margin; i++) {
+        row[i] = row[layer->margin];
+        row[layer->margin + f->size.width + i] = row[layer->margin + f->size.width - 1];
+    }
+}
+
+static size_t in_layer(const rcpu_layer *layer, uint32_t y)
+{
+    return (size_t)y * layer->stride + layer->margin;
 }
 
 static void clear_rows(void *user, uint32_t worker, uint32_t job)
 {
     (void)worker;
-    round_of *r = user;
-    const rcpu_size *size = &r->frames->size;
-    size_t from = (size_t)job * ROWS_PER_JOB * size->stride;
-    size_t count = (size_t)end_of(r->frames, job) * size->stride - from;
-    for (uint32_t d = 0; d < r->dirty_count; d++)
-        empty(r->dirty[d] + from, count);
+    pass *p = user;
+    size_t stride = p->frames->size.stride, end = end_of(p->frames, job) * stride;
+    for (uint32_t d = 0; d < p->drawn_count; d++)
+        for (size_t i = job * ROWS_PER_JOB * stride; i < end; i++)
+            p->drawn[d][i] = RCPU_EMPTY;
 }
 
 void rcpu_frames_clear(rcpu_frames *frames, rcpu_threads *threads)
 {
-    round_of r = start(frames, NULL);
-    rcpu_threads_run(threads, 0, job_count(frames), clear_rows, &r);
-    memset(frames->dirty, 0, sizeof frames->dirty);
-    frames->merged = false;
-}
-
-/* Repeats both ends of a row of logarithms. */
-static void extend(const rcpu_frames *f, float *row)
-{
-    for (uint32_t i = 0; i < f->margin; i++) {
-        row[i] = row[f->margin];
-        row[f->margin + f->size.width + i] = row[f->margin + f->size.width - 1];
-    }
+    pass p = {.frames = frames};
+    find_drawn(&p);
+    run(&p, threads, clear_rows);
+    memset(frames->drawn, 0, sizeof frames->drawn);
+    frames->merged = frames->blending = false;
 }
 
 static void merge_rows(void *user, uint32_t worker, uint32_t job)
 {
     (void)worker;
-    round_of *r = user;
-    rcpu_frames *f = r->frames;
+    pass *p = user;
+    rcpu_frames *f = p->frames;
     for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++) {
-        size_t first = (size_t)y * f->size.stride;
-        float *logs = f->logs + (size_t)y * f->log_stride;
-        r->kernel->merge(r->dirty, r->dirty_count, first, f->size.stride);
-        r->kernel->logs(f->frames[0] + first, f->size.width, logs + f->margin);
-        extend(f, logs);
+        size_t first = (size_t)y * f->size.stride, at = in_layer(&f->points, y);
+        p->kernel->merge(p->drawn, p->drawn_count, first, f->size.stride);
+        p->kernel->look(f->frames[0] + first, f->size.width, f->points.logs + at,
+                        f->points.colours + at);
+        extend(f, &f->points, y);
     }
 }
 
 void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads)
 {
     if (frames->merged) return;
-    round_of r = start(frames, kernel);
-    rcpu_threads_run(threads, 0, job_count(frames), merge_rows, &r);
-    for (uint32_t i = 1; i < frames->frame_count; i++)
-        frames->dirty[i] = false;
+    pass p = {.frames = frames, .kernel = kernel};
+    find_drawn(&p);
+    run(&p, threads, merge_rows);
+    memset(frames->drawn, 0, sizeof frames->drawn);
+    frames->drawn[0] = true;
     frames->merged = true;
+}
+
+static void clear_sums(void *user, uint32_t worker, uint32_t job)
+{
+    (void)worker;
+    pass *p = user;
+    size_t stride = p->frames->size.stride, first = job * ROWS_PER_JOB * stride;
+    for (uint32_t s = 0; s < p->frames->sums_count; s++)
+        memset(p->frames->sums[s] + first, 0,
+               (end_of(p->frames, job) * stride - first) * sizeof(rcpu_sums));
+}
+
+bool rcpu_frames_blend(rcpu_frames *frames, rcpu_threads *threads, mospt_err *err)
+{
+    uint32_t count = count_for(sums_size(frames), frames->frame_count);
+    if (!make_layer(frames, &frames->blended, err)) return false;
+    while (frames->sums_count < count) {
+        rcpu_sums *sums = rcpu_memory_take(sums_size(frames));
+        if (sums == NULL) return mospt_err_nomem(err, sums_size(frames));
+        frames->sums[frames->sums_count++] = sums;
+    }
+    pass p = {.frames = frames};
+    run(&p, threads, clear_sums);
+    frames->blending = true;
+    return true;
+}
+
+static void resolve_rows(void *user, uint32_t worker, uint32_t job)
+{
+    (void)worker;
+    pass *p = user;
+    rcpu_frames *f = p->frames;
+    for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++) {
+        size_t first = (size_t)y * f->size.stride, at = in_layer(p->to, y);
+        p->kernel->add(f->sums, f->sums_count, first, f->size.width);
+        p->kernel->resolve(f->sums[0] + first, f->frames[0] + first, f->size.width, p->slab_log,
+                           p->to->logs + at, p->to->colours + at);
+        extend(f, p->to, y);
+    }
+}
+
+static void fill_rows(void *user, uint32_t worker, uint32_t job)
+{
+    (void)worker;
+    pass *p = user;
+    for (uint32_t y = job * ROWS_PER_JOB; y < end_of(p->frames, job); y++) {
+        p->kernel->fill(p->hole, y, p->from, p->to);
+        extend(p->frames, p->to, y);
+    }
+}
+
+static void shade_rows(void *user, uint32_t worker, uint32_t job)
+{
+    (void)worker;
+    pass *p = user;
+    rcpu_frames *f = p->frames;
+    for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++)
+        p->kernel->shade(p->light, y, p->from, f->picture + (size_t)y * f->size.stride);
+}
+
+bool rcpu_frames_finish(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,
+                        const rcpu_light *light, const rcpu_hole *hole, float slab_log,
+                        mospt_err *err)
+{
+    pass p = {.frames = frames, .kernel = kernel, .light = light, .hole = hole};
+    rcpu_frames_merge(frames, kernel, threads);
+    p.from = &frames->points, p.slab_log = slab_log;
+    if (frames->blending) {
+        p.to = &frames->blended;
+        run(&p, threads, resolve_rows);
+        p.from = p.to;
+    }
+    if (hole->radius > 0) {
+        if (!make_layer(frames, &frames->filled, err)) return false;
+        p.to = &frames->filled;
+        run(&p, threads, fill_rows);
+        p.from = p.to;
+    }
+    run(&p, threads, shade_rows);
+    return true;
 }

@@ -38,35 +38,64 @@ typedef struct {
     bool round; /* leaves out the corners of the square */
     float bend; /* a splat bends away from the eye by its width times this at its rim, as a share
                    of the distance; 0: it does not */
-    float square_px; /* narrower ones are squares, whatever is said here */
+    float square_px;      /* narrower ones are squares, whatever is said here */
+    float slab, slab_log; /* of blending: a share of the distance, and log2(1 + slab) */
 } rcpu_view;
+
+/* What is summed up of one pixel, see section 2 of render/gl/rgl.h. */
+typedef struct {
+    uint32_t r, g, b, weight;
+    int32_t depth;
+} rcpu_sums;
+
+/* What a picture shows of each pixel before it is lit: log2 of the distance, and the colour. Rows
+ * have a margin at both ends, where the outermost logarithms are repeated. */
+typedef struct {
+    float *logs;       /* [stride * height], owned */
+    uint32_t *colours; /* [stride * height], owned; red in the lowest byte, then green and blue */
+    uint32_t stride, margin;
+} rcpu_layer;
+
+/* How holes are filled: section 3 of render/gl/rgl.h. */
+typedef struct {
+    rcpu_size size;
+    int radius;
+    float behind_log, spread_log, far_log;
+} rcpu_hole;
 
 /* What a row is shaded with. */
 typedef struct {
     rcpu_size size;
     float edl_strength;
     int straight, diagonal; /* steps to the neighbours, pixels */
-    uint32_t log_stride;    /* of the logarithms */
     float background_top[3], background_bottom[3];
 } rcpu_light;
 
 typedef struct {
     const char *name;
     /* Draws points of one pixel each, or splats, into a frame.
-     * frame    [stride * height + 1]; what misses the picture goes to the last one */
+     * frame    [stride * height + 16]; what misses the picture may go to the pixels at the end */
     void (*points)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                    int64_t *frame);
     void (*splats)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                    int64_t *frame);
-    /* Makes frames[0][0 .. count - 1] the minimum of all and the others empty. A multiple of 16. */
+    /* Makes frames[0][from .. from + count - 1] the minimum of all, and the others empty. */
     void (*merge)(int64_t *const *frames, uint32_t frame_count, size_t from, size_t count);
-    /* log2 of the distances of a row; RCPU_SKY where there is no point. */
-    void (*logs)(const int64_t *row, uint32_t count, float *out);
+    /* A row of a frame as a layer has it. */
+    void (*look)(const int64_t *row, uint32_t count, float *logs, uint32_t *colours);
+    /* Adds up what is near enough behind the nearest. */
+    void (*blend)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
+                  const int64_t *nearest, rcpu_sums *sums);
+    /* Makes sums[0][from .. from + count - 1] the sum of all, and the others zero. */
+    void (*add)(rcpu_sums *const *sums, uint32_t sums_count, size_t from, size_t count);
+    /* A row of sums as a layer has it. */
+    void (*resolve)(const rcpu_sums *sums, const int64_t *nearest, uint32_t count, float slab_log,
+                    float *logs, uint32_t *colours);
+    /* Fills the holes of a row. */
+    void (*fill)(const rcpu_hole *hole, uint32_t y, const rcpu_layer *from, const rcpu_layer *to);
     /* Shades a row.
-     * logs     the picture's first logarithm; beyond both ends of a row the outermost are repeated
-     * rgba     [stride] of the row */
-    void (*shade)(const rcpu_light *light, uint32_t y, const int64_t *frame, const float *logs,
-                  uint32_t *rgba);
+     * rgba     [stride of the frame] */
+    void (*shade)(const rcpu_light *light, uint32_t y, const rcpu_layer *layer, uint32_t *rgba);
 } rcpu_kernel;
 
 /* The kernel of that name, or, with NULL, the best that this processor has; NULL: there is none. */

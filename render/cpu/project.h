@@ -90,3 +90,9 @@ static inline uint32_t rcpu_key_lane(uint32_t at)
     uint32_t half = RCPU_LANES / 2, high = at >= half, within = at - high * half;
     return within / 2 * 4 + within % 2 + 2 * high;
 }
+
+/* The vertex of a block that a lane holds: rcpu_load() deals them to the quarters. */
+static inline uint32_t rcpu_lane_vertex(uint32_t lane)
+{
+    return lane % 4 * (RCPU_LANES / 4) + lane / 4;
+}

@@ -1,33 +1,19 @@
 /* From distances and colours to a picture: the terms of RGL_SHADE_FRAGMENT. */
 #include "render/cpu/lanes.h"
+#include "render/cpu/log.h"
 
 #include <math.h>
 
-void RCPU_NAME(logs)(const int64_t *row, uint32_t count, float *out);
-void RCPU_NAME(shade)(const rcpu_light *light, uint32_t y, const int64_t *frame, const float *logs,
-                      uint32_t *rgba);
+void RCPU_NAME(look)(const int64_t *row, uint32_t count, float *logs, uint32_t *colours);
+void RCPU_NAME(shade)(const rcpu_light *light, uint32_t y, const rcpu_layer *layer, uint32_t *rgba);
 
-/* log2 of a positive number: its exponent, and for a mantissa m between sqrt(1/2) and sqrt(2) the
- * series of atanh((m - 1) / (m + 1)), whose next term is below 1e-9. */
-static inline float log2_of(uint32_t bits)
-{
-    uint32_t shifted = bits - 0x3f3504f3u; /* sqrt(1/2) */
-    int32_t exponent = (int32_t)shifted >> 23;
-    uint32_t mantissa = (shifted & 0x7fffffu) + 0x3f3504f3u;
-    float m;
-    memcpy(&m, &mantissa, sizeof m);
-    float t = (m - 1) / (m + 1), t2 = t * t;
-    float series =
-        2.88539008f +
-        t2 * (0.961796694f + t2 * (0.577078016f + t2 * (0.412198583f + t2 * 0.320598898f)));
-    return (float)exponent + t * series;
-}
-
-void RCPU_NAME(logs)(const int64_t *row, uint32_t count, float *out)
+void RCPU_NAME(look)(const int64_t *row, uint32_t count, float *restrict logs,
+                     uint32_t *restrict colours)
 {
     for (uint32_t i = 0; i < count; i++) {
-        float log = log2_of((uint32_t)(row[i] >> 32));
-        out[i] = row[i] == RCPU_EMPTY ? RCPU_SKY : log;
+        float log = rcpu_log2((uint32_t)(row[i] >> 32));
+        logs[i] = row[i] == RCPU_EMPTY ? RCPU_SKY : log;
+        colours[i] = (uint32_t)row[i];
     }
 }
 
@@ -87,11 +73,11 @@ typedef struct {
     const float *here, *up, *down, *far_up, *far_down;
 } rows;
 
-static const float *row_at(const rcpu_light *light, const float *logs, int64_t y)
+static const float *row_at(const rcpu_light *light, const rcpu_layer *layer, int64_t y)
 {
     int64_t last = (int64_t)light->size.height - 1;
     y = y < 0 ? 0 : y > last ? last : y;
-    return logs + (size_t)y * light->log_stride;
+    return layer->logs + (size_t)y * layer->stride + layer->margin;
 }
 
 static inline lanes_f brightness(const rcpu_light *light, const rows *r, lanes_f here, uint32_t x)
@@ -104,29 +90,20 @@ static inline lanes_f brightness(const rcpu_light *light, const rows *r, lanes_f
     return exp_of(sum * -light->edl_strength);
 }
 
-static inline lanes_u colours_at(const int64_t *row)
-{
-    lanes_u colours;
-    for (uint32_t l = 0; l < RCPU_LANES; l++)
-        colours[l] = (uint32_t)row[l];
-    return colours;
-}
-
-void RCPU_NAME(shade)(const rcpu_light *light, uint32_t y, const int64_t *frame, const float *logs,
-                      uint32_t *rgba)
+void RCPU_NAME(shade)(const rcpu_light *light, uint32_t y, const rcpu_layer *layer, uint32_t *rgba)
 {
     const rows r = {
-        .here = row_at(light, logs, y),
-        .up = row_at(light, logs, (int64_t)y - light->diagonal),
-        .down = row_at(light, logs, (int64_t)y + light->diagonal),
-        .far_up = row_at(light, logs, (int64_t)y - light->straight),
-        .far_down = row_at(light, logs, (int64_t)y + light->straight),
+        .here = row_at(light, layer, y),
+        .up = row_at(light, layer, (int64_t)y - light->diagonal),
+        .down = row_at(light, layer, (int64_t)y + light->diagonal),
+        .far_up = row_at(light, layer, (int64_t)y - light->straight),
+        .far_down = row_at(light, layer, (int64_t)y + light->straight),
     };
-    const int64_t *row = frame + (size_t)y * light->size.stride;
-    lanes_u behind = (lanes_u){0} + background(light, y);
+    const uint32_t *row = layer->colours + (size_t)y * layer->stride + layer->margin;
+    lanes_u behind = (lanes_u){0} + background(light, y), colours;
     for (uint32_t x = 0; x < light->size.width; x += RCPU_LANES) {
         lanes_f here = load(r.here + x);
-        lanes_u colours = colours_at(row + x);
+        memcpy(&colours, row + x, sizeof colours);
         if (light->edl_strength > 0) {
             lanes_f factor = brightness(light, &r, here, x);
             colours = scale_channel(colours, 0, factor) | scale_channel(colours, 8, factor) |

@@ -33,11 +33,12 @@ static inline void rcpu_walk_down(rcpu_walk *w, const uint32_t place[3], int bit
     memcpy(w->place, place, sizeof w->place);
 }
 
-/* octants  of at least one node */
+/* octants  of at least one node; NULL: there will be no walk */
 static inline void rcpu_walk_start(rcpu_walk *w, const uint32_t *octants, uint32_t grid_bits)
 {
     static const uint32_t anywhere[3] = {0, 0, 0};
-    w->octants = octants;
+    *w = (rcpu_walk){.octants = octants, .cell = 1};
+    if (octants == NULL) return;
     w->used_bits = grid_bits < 32 ? (UINT32_C(1) << grid_bits) - 1 : UINT32_MAX;
     w->node[grid_bits - 1] = 0;
     rcpu_walk_down(w, anywhere, (int)grid_bits - 1);
