@@ -169,6 +169,13 @@ static bool o_no_occlusion(cli_options *o, const char *v)
     return (void)v, o->limits.no_occlusion = true;
 }
 
+static bool o_fps(cli_options *o, const char *v)
+{
+    char *end;
+    o->fps = strtod(v, &end);
+    return end != v && *end == '\0' && o->fps >= 1 && o->fps <= 240;
+}
+
 static bool o_no_edl(cli_options *o, const char *v)
 {
     return (void)v, o->look.no_edl = true;
@@ -601,6 +608,7 @@ static const struct {
     {"gpu-cache", "SIZE", 0, V | S | R, o_gpu, "most graphics memory for nodes (default: 1G)"},
     {"no-occlusion", NULL, 0, V | S | R, o_no_occlusion,
      "spend points on nodes that are hidden behind others, too"},
+    {"fps", "RATE", 0, V, o_fps, "frames a second while the camera moves, 1 to 240 (default: 30)"},
     {"frames", "N", 0, V, o_frames, "close the window after so many frames"},
     {"screenshot", "PATH", 0, V, o_screenshot, "write the window's picture when it closes"},
     {"path", "FILE", 0, V | R, o_path,

@@ -40,6 +40,7 @@ typedef struct {
     uint32_t threads, inner_depth; /* 0: default */
     uint64_t memory;               /* bytes; 0: default */
     uint32_t width, height;        /* 0: default */
+    double fps;                    /* of a window; 0: default */
     uint32_t frames;               /* 0: until the window is closed */
     rend_camera_options camera;
     rend_look look;

@@ -382,6 +382,7 @@ static int command_view(const cli_options *o)
                                        .look = o->look,
                                        .limits = o->limits,
                                        .engine = {o->renderer, o->threads},
+                                       .fps = o->fps,
                                        .frames = o->frames,
                                        .screenshot = o->screenshot,
                                        .path = o->camera_path,

@@ -3,9 +3,12 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
 
-enum { THREADS_MAX = 16 };
+enum { THREADS_MAX = 16, BEHIND_DRAWING = 5 /* nice */ };
 
 typedef struct finished {
     rend_loaded loaded;
@@ -120,9 +123,16 @@ static void finish(rend_loader *l, uint32_t node, uint32_t paint_number, finishe
     pthread_cond_broadcast(&l->done);
 }
 
+/* Where there are no processors to spare, drawing comes first. */
+static void give_way(void)
+{
+    setpriority(PRIO_PROCESS, (id_t)syscall(SYS_gettid), BEHIND_DRAWING);
+}
+
 static void *work(void *argument)
 {
     rend_loader *l = argument;
+    give_way();
     pthread_mutex_lock(&l->lock);
     while (!l->quit) {
         uint32_t node;

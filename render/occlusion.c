@@ -50,6 +50,17 @@ void rend_occlusion_destroy(rend_occlusion *occlusion)
     free(occlusion);
 }
 
+/* fminf() and fmaxf() would be calls, because they must treat NaN in their own way. */
+static float nearer_of(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+static float farther_of(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 static uint32_t half_of(uint32_t count)
 {
     return (count + 1) / 2;
@@ -127,8 +138,8 @@ static void order(float *restrict nearer, float *restrict farther, uint32_t coun
 {
     for (uint32_t t = 0; t < count; t++) {
         float a = nearer[t], b = farther[t];
-        nearer[t] = a < b ? a : b;
-        farther[t] = a < b ? b : a;
+        nearer[t] = nearer_of(a, b);
+        farther[t] = farther_of(a, b);
     }
 }
 
@@ -165,7 +176,7 @@ static void shrink_silhouettes(const level *l)
             float farthest = 0;
             for (uint32_t v = y0; v <= y1; v++)
                 for (uint32_t u = x0; u <= x1; u++)
-                    farthest = fmaxf(farthest, l->nearest[(size_t)v * l->width + u]);
+                    farthest = farther_of(farthest, l->nearest[(size_t)v * l->width + u]);
             l->farthest[(size_t)y * l->width + x] = farthest;
         }
     }
@@ -178,8 +189,8 @@ static void reduce(const level *fine, const level *coarse)
             float farthest = 0, nearest = 1;
             for (uint32_t v = 2 * y; v < 2 * y + 2 && v < fine->height; v++)
                 for (uint32_t u = 2 * x; u < 2 * x + 2 && u < fine->width; u++) {
-                    farthest = fmaxf(farthest, fine->farthest[(size_t)v * fine->width + u]);
-                    nearest = fminf(nearest, fine->nearest[(size_t)v * fine->width + u]);
+                    farthest = farther_of(farthest, fine->farthest[(size_t)v * fine->width + u]);
+                    nearest = nearer_of(nearest, fine->nearest[(size_t)v * fine->width + u]);
                 }
             coarse->farthest[(size_t)y * coarse->width + x] = farthest;
             coarse->nearest[(size_t)y * coarse->width + x] = nearest;
@@ -211,7 +222,7 @@ bool rend_occlusion_aim(rend_occlusion *occlusion, const rend_frame *frame)
                            frame->height == f->height &&
                            memcmp(frame->rotation, f->rotation, sizeof f->rotation) == 0 &&
                            memcmp(frame->tan_half, f->tan_half, sizeof f->tan_half) == 0;
-    return occlusion->same_view;
+    return occlusion->same_view || !occlusion->knows;
 }
 
 /* False if some of the cube is not in front of the eye. */

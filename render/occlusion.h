@@ -38,7 +38,8 @@ void rend_occlusion_learn(rend_occlusion *occlusion, const rend_frame *frame);
 /* Hides nothing until it learns again. */
 void rend_occlusion_forget(rend_occlusion *occlusion);
 
-/* Says from which view will be asked; true if it is the one that was learnt. */
+/* Says from which view will be asked; false if answers will be guesses, because another one was
+ * learnt. */
 bool rend_occlusion_aim(rend_occlusion *occlusion, const rend_frame *frame);
 
 /* True if the cube is hidden.

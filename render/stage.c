@@ -19,6 +19,9 @@ enum {
 enum { GROUP_SMALLEST, GROUP_SMALL, GROUP_WIDE, GROUPS };
 /* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
 #define UPLOAD_BYTES_PER_FRAME (64 * REND_MIB)
+/* While less than this share of the points is hidden, depths are read back now and then only. */
+#define HIDDEN_SHARE_MIN 0.05
+enum { LOOK_EVERY = 8, LOOKS_AT_REST = 6 };
 /* Fewer points than that are not worth a look at what they hide. */
 #define OCCLUSION_POINTS_MIN 200000
 #define OCCLUDER_SHARE 2 /* of the budget, for what hides */
@@ -65,6 +68,17 @@ struct rend_stage {
     rend_clip clip; /* of the selection, if the view has one */
     rend_figures figures;
     rend_occlusion *occlusion;
+
+    /* A picture in a window, drawn over several frames. */
+    struct {
+        bool begun, again; /* again: in the second round, of blending */
+        bool is_guess;     /* what is hidden was asked of another view */
+        uint32_t next;     /* in the order */
+        rend_view_of view;
+    } hand;
+    uint32_t hidden_before; /* nodes, in the picture before; and points drawn in it */
+    uint64_t points_before;
+    uint32_t looks, guesses; /* behind pictures since the camera rests; pictures of guesses */
 };
 
 static void evict_vertices(void *user, uint32_t node, void *value)
@@ -192,6 +206,7 @@ static bool upload_runs(rend_stage *s, uint32_t node, const rend_place *place,
             return false;
         done += part;
     }
+    s->figures.uploaded_bytes += count * sizeof *vertices;
     return true;
 }
 
@@ -515,9 +530,9 @@ static void take_loaded(rend_stage *s)
             store(s, &loaded[i]);
 }
 
-/* Does the same for what is drawn in the colours of before: it keeps its place. */
-static bool fetch_stale(rend_stage *s, uint32_t *wanted, uint64_t *bytes, rend_progress *progress,
-                        mospt_err *err)
+/* Puts new colours over the old ones: a node keeps its place. */
+static bool fetch_stale(rend_stage *s, uint64_t most, uint32_t *wanted, uint64_t *bytes,
+                        rend_progress *progress, mospt_err *err)
 {
     for (uint32_t i = 0; i < s->selection->draw_count; i++) {
         uint32_t node = s->selection->draws[i].node;
@@ -529,7 +544,7 @@ static bool fetch_stale(rend_stage *s, uint32_t *wanted, uint64_t *bytes, rend_p
             continue;
         }
         *progress = REND_AGAIN;
-        if (*bytes >= UPLOAD_BYTES_PER_FRAME) break;
+        if (*bytes >= most) break;
         if (!upload_runs(s, node, rend_cache_use(s->gpu, node), vertices, err)) return false;
         s->gpu_paint[node] = s->paint_number;
         *bytes += mospt_dataset_vertices_size(s->dataset, node);
@@ -537,54 +552,149 @@ static bool fetch_stale(rend_stage *s, uint32_t *wanted, uint64_t *bytes, rend_p
     return true;
 }
 
-/* Uploads what the RAM cache has, and asks the loader for the rest. */
-static bool fetch(rend_stage *s, rend_progress *progress, mospt_err *err)
+/* What the selection asked for, as far as it is not there or damaged yet. */
+static bool fetch_requested(rend_stage *s, uint64_t most, uint32_t *wanted, uint64_t *bytes,
+                            rend_progress *progress, mospt_err *err)
+{
+    for (uint32_t i = 0; i < s->selection->request_count; i++) {
+        uint32_t node = s->selection->requests[i].node;
+        if (s->residency[node] != REND_ABSENT) { /* since an earlier part of this picture */
+            *progress = REND_AGAIN;
+            continue;
+        }
+        s->figures.pending++;
+        const mospt_vertex *vertices = rend_cache_use(s->ram, node);
+        if (vertices == NULL) {
+            s->wanted[(*wanted)++] = node;
+            continue;
+        }
+        *progress = REND_AGAIN;
+        if (*bytes >= most) continue;
+        /* The selection asks for no more than fits, and what was just put there must not make room
+         * for what comes next. */
+        if (!put_on_gpu(s, node, vertices, err)) return false;
+        *bytes += mospt_dataset_vertices_size(s->dataset, node);
+    }
+    return true;
+}
+
+/* Uploads what the RAM cache has, and asks the loader for the rest.
+ * most     bytes to upload, but for the last node */
+static bool fetch(rend_stage *s, uint64_t most, rend_progress *progress, mospt_err *err)
 {
     uint64_t bytes = 0;
     uint32_t wanted = 0;
     *progress = REND_SETTLED;
-    s->figures.pending = s->selection->request_count;
-    if (!fetch_stale(s, &wanted, &bytes, progress, err)) return false;
-    for (uint32_t i = 0; i < s->selection->request_count; i++) {
-        uint32_t node = s->selection->requests[i].node;
-        const mospt_vertex *vertices = rend_cache_use(s->ram, node);
-        if (vertices == NULL) {
-            s->wanted[wanted++] = node;
-            continue;
-        }
-        *progress = REND_AGAIN;
-        if (bytes >= UPLOAD_BYTES_PER_FRAME) break;
-        /* The selection asks for no more than fits, and what was just put there must not make room
-         * for what comes next. */
-        if (!put_on_gpu(s, node, vertices, err)) return false;
-        bytes += mospt_dataset_vertices_size(s->dataset, node);
-    }
+    s->figures.pending = 0;
+    if (!fetch_stale(s, most, &wanted, &bytes, progress, err) ||
+        !fetch_requested(s, most, &wanted, &bytes, progress, err))
+        return false;
     if (*progress == REND_SETTLED && wanted > 0) *progress = REND_WAITING;
     return rend_loader_request(s->loader, s->wanted, wanted, err);
 }
 
-static bool select_frame(rend_stage *s, const rend_view_of *view, mospt_err *err)
+static bool is_same_shape(const rend_look *a, const rend_look *b)
 {
+    return a->size_mode == b->size_mode && a->point_px == b->point_px && a->point_m == b->point_m &&
+           a->has_clip == b->has_clip && memcmp(&a->clip, &b->clip, sizeof a->clip) == 0;
+}
+
+/* What a wall hid that has been cut away, or that is drawn with smaller points, is hidden no more.
+ */
+static void forget_other_shapes(rend_stage *s, const rend_view_of *view)
+{
+    if (!view->no_occlusion && is_same_shape(&view->look, &s->hand.view.look)) return;
+    rend_occlusion_forget(s->occlusion);
+    s->points_before = 0;
+}
+
+static bool begin_picture(rend_stage *s, const rend_view_of *view, mospt_err *err)
+{
+    forget_other_shapes(s, view);
     rend_select_input input = input_of(s, view);
     input.residency = s->residency;
     input.page_limit = s->page_count;
-    return run_selection(s, view, &input, err);
+    input.occlusion = s->occlusion;
+    bool is_guess = !rend_occlusion_aim(s->occlusion, &s->frame);
+    if (!run_selection(s, view, &input, err)) return false;
+    unpin_all(s);
+    for (uint32_t i = 0; i < s->selection->draw_count; i++)
+        if (!pin(s, s->selection->draws[i].node, err)) return false;
+    s->hand.begun = true, s->hand.again = false, s->hand.next = 0;
+    s->hand.is_guess = is_guess;
+    s->hand.view = *view;
+    return true;
 }
 
-bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
-                      mospt_err *err)
+/* How far the order goes in one frame. */
+static uint32_t end_of_part(const rend_stage *s, uint64_t most)
 {
+    uint64_t points = 0;
+    uint32_t to = s->hand.next;
+    for (; to < s->selection->draw_count; to++) {
+        points += draw_at(s, to)->count;
+        if (most > 0 && points > most && to > s->hand.next) break;
+    }
+    return to;
+}
+
+/* Draws a part; the hand lets go of the picture with the last one. Blending takes a second round,
+ * but for a picture of one part. */
+static bool draw_part(rend_stage *s, uint64_t most, mospt_err *err)
+{
+    const rend_view_of *view = &s->hand.view;
+    rgl_scene scene = make_scene(s, view);
+    uint32_t from = s->hand.next, to = end_of_part(s, most);
+    bool first = from == 0 && !s->hand.again, end = to == s->selection->draw_count;
+    bool again = scene.blend_slab > 0 && (s->hand.again || (first && end));
+    bool last = end && again == (scene.blend_slab > 0);
+    int parts = (first ? RGL_BEGIN : 0) | (again ? RGL_AGAIN : 0) | (last ? RGL_END : 0);
+    rend_figures before = s->figures;
+    if (!make_batches(s, &view->look, from, to, err)) return false;
+    s->figures.points_total += s->figures.points_drawn - before.points_drawn;
+    if (s->hand.again)
+        s->figures.points_drawn = before.points_drawn, s->figures.nodes_drawn = before.nodes_drawn;
+    if (!rgl_draw(s->gl, &scene, s->batches, s->batch_count, parts | view->parts, err))
+        return false;
+    s->hand.begun = !last;
+    s->hand.again = s->hand.again || end;
+    s->hand.next = end ? 0 : to;
+    return true;
+}
+
+/* After a picture: what it hides, for the next one. At rest pictures follow each other until what
+ * is hidden stays the same; while little is, not every picture is looked behind. */
+static bool look_behind(rend_stage *s, rend_progress *progress, mospt_err *err)
+{
+    const rend_selection *r = s->selection;
+    uint64_t points = r->points + r->points_hidden;
+    bool pays = r->stopped || points > OCCLUSION_POINTS_MIN || r->hidden > 0;
+    bool little = (double)r->points_hidden < HIDDEN_SHARE_MIN * (double)points;
+    bool same = r->hidden == s->hidden_before && r->points == s->points_before;
+    s->hidden_before = r->hidden, s->points_before = r->points;
+    if (s->hand.view.no_occlusion || !pays) return true;
+    if (!s->hand.is_guess && (same || ++s->looks > LOOKS_AT_REST)) return true;
+    if (r->hidden > 0 || r->stopped) *progress = REND_AGAIN;
+    if (s->hand.is_guess) s->looks = 0;
+    if (s->hand.is_guess && little && ++s->guesses % LOOK_EVERY != 0) return true;
+    return learn_occlusion(s, err);
+}
+
+bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
+                      rend_progress *progress, mospt_err *err)
+{
+    static const rend_allowance unlimited = {0};
+    if (allowed == NULL) allowed = &unlimited;
     if (!use_colours(stage, &view->look, err)) return false;
     take_loaded(stage);
-    if (!select_frame(stage, view, err)) return false;
-    unpin_all(stage);
-    for (uint32_t i = 0; i < stage->selection->draw_count; i++)
-        if (!pin(stage, stage->selection->draws[i].node, err)) return false;
-    if (!make_batches(stage, &view->look, 0, stage->selection->draw_count, err)) return false;
-    rgl_scene scene = make_scene(stage, view);
-    int parts = RGL_BEGIN | RGL_END | view->parts | (scene.blend_slab > 0 ? RGL_AGAIN : 0);
-    if (!rgl_draw(stage->gl, &scene, stage->batches, stage->batch_count, parts, err)) return false;
-    return fetch(stage, progress, err);
+    bool goes_on = stage->hand.begun && memcmp(view, &stage->hand.view, sizeof *view) == 0;
+    if (!goes_on && !begin_picture(stage, view, err)) return false;
+    if (!draw_part(stage, allowed->points, err) ||
+        !fetch(stage, or_default(allowed->upload_bytes, UPLOAD_BYTES_PER_FRAME), progress, err))
+        return false;
+    if (!stage->hand.begun) return look_behind(stage, progress, err);
+    *progress = REND_PART;
+    return true;
 }
 
 /* ---- a picture ---- */
@@ -655,6 +765,7 @@ static bool bring(rend_stage *s, uint32_t from, uint32_t to, mospt_err *err)
 bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
     uint32_t wanted = 0;
+    stage->hand.begun = false;
     rend_select_input input = input_of(stage, view);
     input.occlusion = stage->occlusion; /* of the picture before: a guess, good enough to read by */
     rend_occlusion_aim(stage->occlusion, &stage->frame);
@@ -710,6 +821,7 @@ static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *e
 
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
+    stage->hand.begun = false;
     if (!use_colours(stage, &view->look, err)) return false;
     rend_select_input input = input_of(stage, view);
     if (!run_selection(stage, view, &input, err)) return false;

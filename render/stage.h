@@ -36,6 +36,8 @@ typedef struct {
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
     uint64_t loaded_bytes;                             /* since the start */
+    uint64_t uploaded_bytes;                           /* since the start */
+    uint64_t points_total;                             /* drawn since the start, part by part */
     double waited_s;  /* for the loader, by rend_stage_still(), since the start */
     uint32_t pending; /* nodes that this view still misses */
     uint32_t damaged_nodes;
@@ -52,18 +54,30 @@ bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits 
                        rend_loader_wake *wake, void *user, rend_stage **out, mospt_err *err);
 void rend_stage_destroy(rend_stage *stage);
 
+/* What a frame in a window may cost. */
+typedef struct {
+    uint64_t points;       /* drawn; a picture of more is drawn over several frames; 0: no limit */
+    uint64_t upload_bytes; /* a node more at most; 0: 64 MiB */
+} rend_allowance;
+
 typedef enum {
     REND_SETTLED, /* the same view again would draw the same picture, and nothing more is to come */
     REND_WAITING, /* as long as the loader does not wake anybody, too */
     REND_AGAIN,   /* the next frame shows more */
+    REND_PART,    /* there is no picture yet: the same view again goes on drawing it */
 } rend_progress;
 
 /* Both fail with MOSPT_EINVAL for colours that the dataset cannot show, see rend_scheme_fits(). */
 
-/* Draws what is resident and asks for what is not. Uploads at most a fixed number of bytes; never
- * waits. */
-bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, rend_progress *progress,
-                      mospt_err *err);
+/* Draws what is resident and asks for what is not; never waits. A picture that takes several frames
+ * is of what was resident at the first of them, and goes on as long as the view is the same, to the
+ * last byte of it; until then the one before can stay on the screen.
+ *
+ * What is hidden is asked of the picture before, which was perhaps another view: what was hidden
+ * from there may be missing in one picture, and is in the next one, which is then promised by
+ * REND_AGAIN. allowed  NULL: no limits */
+bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
+                      rend_progress *progress, mospt_err *err);
 
 /* Says which picture is wanted next: has the loader read what it will probably miss while the one
  * before is being drawn. Figures are those of a guess at it from now on. */

@@ -227,7 +227,7 @@ static bool draw_pass(rend_take *t, const rend_view_of *view, rend_figures *figu
     double start = now_s(), waited;
     rend_stage_figures(t->stage, figures);
     waited = figures->waited_s;
-    bool ok = t->options.live ? rend_stage_frame(t->stage, view, &ignored, err)
+    bool ok = t->options.live ? rend_stage_frame(t->stage, view, NULL, &ignored, err)
                               : rend_stage_still(t->stage, view, err);
     if (!ok) return false;
     t->legend = *rend_stage_legend(t->stage);

@@ -6,6 +6,7 @@
 #include "render/hud.h"
 #include "render/image.h"
 #include "render/orbit.h"
+#include "render/pace.h"
 #include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
@@ -19,10 +20,10 @@
 
 enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
-#define STOP_ASKED_S 0.25 /* between two looks at whether to stop */
-#define MOVING_FRAME_MS 66.0
-#define MOVING_BUDGET_MIN 200000.0
+#define STOP_ASKED_S 0.25       /* between two looks at whether to stop */
 #define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
+#define TRAVEL_S 1.0            /* one that moved for longer is somewhere else */
+#define FULLER 4                /* how many times as many points the next picture at rest has */
 #define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
 #define FLY_FASTER 4
 #define ZOOM_PER_STEP 0.85
@@ -53,9 +54,11 @@ typedef struct {
 
     atomic_bool loaded; /* set by the loader's threads: the next frame shows more */
     rend_progress progress;
-    double flown_at;      /* seconds; 0: not flying */
-    double moved_at;      /* seconds; 0: the last frame was drawn at rest */
-    double points_per_ms; /* of the frames so far; 0: not known */
+    double flown_at;   /* seconds; 0: not flying */
+    double moved_at;   /* seconds; 0: the camera rests */
+    double set_out_at; /* seconds: since when it has moved */
+    rend_pace pace;
+    uint64_t rest_points; /* budget of the pictures at rest, which grows with each; 0: not begun */
     double frame_ms, notice_until;
     char notice[1200];
     rend_view_result result;
@@ -103,7 +106,9 @@ static bool point_at(viewer *v, double x, double y, double out[3])
 
 static void touch_camera(viewer *v)
 {
-    v->moved_at = rgl_window_seconds();
+    double now = rgl_window_seconds();
+    if (v->moved_at == 0) v->set_out_at = now;
+    v->moved_at = now;
     v->dirty = true;
 }
 
@@ -214,6 +219,7 @@ static void scale_budget(viewer *v, double factor)
     budget = fmax(budget * factor, (double)BUDGET_MIN);
     v->view.budget_points = budget >= (double)total && factor > 1 ? REND_ALL : (uint64_t)budget;
     v->budget_changed = true;
+    v->rest_points = 0;
 }
 
 static void scale_points(viewer *v, float step)
@@ -239,7 +245,7 @@ static void save_picture(viewer *v)
     localtime_r(&now, &local);
     strftime(name, sizeof name, "instantpoints-%Y%m%d-%H%M%S.png", &local);
     bool ok = rgb != NULL || mospt_err_nomem(&err, size);
-    ok = ok && rend_stage_frame(v->stage, &still, &ignored, &err) &&
+    ok = ok && rend_stage_frame(v->stage, &still, NULL, &ignored, &err) &&
          rgl_read_pixels(v->engine.gl, false, still.width, still.height, rgb, &err) &&
          rend_image_write(name, rgb, still.width, still.height, &err);
     free(rgb);
@@ -429,22 +435,41 @@ static bool draw_words(viewer *v, mospt_err *err)
            rend_strip_draw(&v->strip, v->text, v->view.width, v->view.height, err);
 }
 
-/* What can be drawn in time while the camera moves. */
-static uint64_t moving_budget(const viewer *v)
+/* Pictures at rest have more and more points, so that the first one is there soon. After a small
+ * movement they go on with as many as there were before it. */
+static uint64_t rest_budget(viewer *v)
 {
-    double budget = fmax(v->points_per_ms * MOVING_FRAME_MS, MOVING_BUDGET_MIN);
-    bool all = v->moved_at == 0 || v->points_per_ms == 0 || budget >= (double)v->view.budget_points;
-    return all ? v->view.budget_points : (uint64_t)budget;
+    uint64_t first = FULLER * rend_pace_points(&v->pace);
+    if (v->rest_points < first) v->rest_points = first;
+    return v->rest_points < v->view.budget_points ? v->rest_points : v->view.budget_points;
 }
 
-/* Small frames say more about everything else than about points. */
-static void measure(viewer *v)
+/* True if the picture at rest, which is done, can be followed by a fuller one. */
+static bool grow_rest_budget(viewer *v)
 {
     rend_figures figures;
     rend_stage_figures(v->stage, &figures);
-    if ((double)figures.points_drawn < MOVING_BUDGET_MIN / 2) return;
-    double now = (double)figures.points_drawn / fmax(v->frame_ms, 0.1);
-    v->points_per_ms = v->points_per_ms > 0 ? 0.7 * v->points_per_ms + 0.3 * now : now;
+    if (figures.pending > 0 || !figures.budget_spent) return false;
+    if (v->rest_points >= v->view.budget_points) return false;
+    v->rest_points = v->rest_points < REND_ALL / FULLER ? v->rest_points * FULLER : REND_ALL;
+    return true;
+}
+
+/* While the camera moves, a frame is as much as fits into its time. At rest it draws so much of a
+ * picture that may be larger. The last one before the window closes is whole. */
+static bool draw_points(viewer *v, bool last, mospt_err *err)
+{
+    uint64_t fits = rend_pace_points(&v->pace);
+    rend_view_of view = v->view;
+    rend_allowance allowed = {.points = fits, .upload_bytes = rend_pace_bytes(&v->pace)};
+    bool moves = v->moved_at > 0 && !last;
+    if (moves && view.budget_points > fits) view.budget_points = fits;
+    if (!moves && !last) view.budget_points = rest_budget(v);
+    if (moves || last) allowed.points = 0;
+    if (!rend_stage_frame(v->stage, &view, &allowed, &v->progress, err)) return false;
+    if (!moves && !last && v->progress != REND_PART && grow_rest_budget(v))
+        v->progress = REND_AGAIN;
+    return true;
 }
 
 static bool write_screenshot(viewer *v, mospt_err *err)
@@ -463,6 +488,18 @@ static bool is_last(const viewer *v)
     return v->quit || (v->options->frames > 0 && v->result.frames + 1 >= v->options->frames);
 }
 
+static void count_frame(viewer *v, const rend_figures *before, double ms)
+{
+    rend_figures now;
+    rend_stage_figures(v->stage, &now);
+    rend_pace_note(&v->pace, now.points_total - before->points_total,
+                   now.uploaded_bytes - before->uploaded_bytes, ms);
+    v->frame_ms = ms;
+    v->result.mean_ms += ms; /* the sum as yet */
+    v->result.slowest_ms = fmax(v->result.slowest_ms, ms);
+    v->result.frames++;
+}
+
 static bool frame(viewer *v, mospt_err *err)
 {
     uint32_t width, height;
@@ -476,23 +513,23 @@ static bool frame(viewer *v, mospt_err *err)
     }
     v->view.width = width, v->view.height = height;
     fit_text(v);
-    rend_view_of view = v->view;
-    view.budget_points = moving_budget(v);
-    if (!rend_stage_frame(v->stage, &view, &v->progress, err) || !draw_words(v, err)) return false;
-    if (is_last(v) && v->options->screenshot != NULL && !write_screenshot(v, err)) return false;
-    rgl_window_show(v->window);
-    v->frame_ms = (rgl_window_seconds() - start) * 1e3;
-    measure(v);
-    v->result.mean_ms += v->frame_ms; /* the sum as yet */
-    v->result.slowest_ms = fmax(v->result.slowest_ms, v->frame_ms);
-    v->result.frames++;
+    bool last = is_last(v) && v->options->screenshot != NULL;
+    rend_figures before;
+    rend_stage_figures(v->stage, &before);
+    if (!draw_points(v, last, err)) return false;
+    if (v->progress != REND_PART) { /* else the picture before stays on the screen */
+        if (!draw_words(v, err)) return false;
+        if (last && !write_screenshot(v, err)) return false;
+        rgl_window_show(v->window);
+    }
+    count_frame(v, &before, (rgl_window_seconds() - start) * 1e3);
     return true;
 }
 
 static bool is_due(const viewer *v)
 {
-    return v->dirty || v->progress == REND_AGAIN || atomic_load(&v->loaded) ||
-           v->options->frames > 0;
+    return v->dirty || v->progress == REND_AGAIN || v->progress == REND_PART ||
+           atomic_load(&v->loaded) || v->options->frames > 0;
 }
 
 /* How long nothing needs to be drawn, unless something happens: seconds, 0 not at all, below 0 for
@@ -504,11 +541,12 @@ static double rest(const viewer *v)
     return v->notice[0] != '\0' ? fmax(v->notice_until - rgl_window_seconds(), 0.01) : -1;
 }
 
-/* After a movement one more frame is owed, with the whole budget. */
+/* After a movement fuller pictures are owed. */
 static void come_to_rest(viewer *v)
 {
     bool held = v->drag != DRAG_NONE && rgl_window_seconds() < v->moved_at + 3 * MOVING_S;
     if (v->moved_at == 0 || held || rgl_window_seconds() < v->moved_at + MOVING_S) return;
+    if (v->moved_at > v->set_out_at + TRAVEL_S) v->rest_points = 0;
     v->moved_at = 0;
     v->dirty = true;
 }
@@ -541,7 +579,10 @@ static bool run(viewer *v, mospt_err *err)
 static bool open_viewer(viewer *v, mospt_err *err)
 {
     const rend_view_options *o = v->options;
+    memset(&v->view, 0, sizeof v->view); /* to the last byte: views are compared */
+    rend_pace_init(&v->pace, o->fps > 0 ? o->fps : REND_FPS_DEFAULT);
     v->view.look = o->look;
+    v->view.no_occlusion = o->limits.no_occlusion;
     v->view.budget_points =
         o->limits.budget_points > 0 ? o->limits.budget_points : REND_VIEW_BUDGET_DEFAULT;
     v->view.min_node_px = o->limits.min_node_px;

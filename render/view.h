@@ -10,6 +10,7 @@ typedef struct {
     rend_look look;
     rend_limits limits; /* budget_points 0: REND_VIEW_BUDGET_DEFAULT; REND_ALL: no limit */
     rend_engine_options engine;
+    double fps;      /* aimed at while the camera moves; 0: REND_FPS_DEFAULT */
     uint64_t frames; /* quit after so many frames, for scripts and tests; 0: when the user does */
     const char *screenshot; /* of the window, words and all, written before it closes; NULL: none */
     const char *path;       /* camera path to edit, see render/strip.h; NULL: a new one */
@@ -26,11 +27,13 @@ typedef struct {
     mospt_err no_words; /* why there were no words over the picture; code MOSPT_OK: there were */
 } rend_view_result;
 
+enum { REND_FPS_DEFAULT = 30 };
+
 /* Shows the dataset until the user has seen enough. While the camera moves, a machine that cannot
- * draw the budget fifteen times a second draws as much of it as it can; all of it appears as soon
- * as the camera rests. When nothing changes and nothing is loading, nothing is drawn.
- * result   NULL: not wanted
- * errors   MOSPT_EINVAL (options; no display), MOSPT_EIO (the driver was lost), MOSPT_ENOMEM
- * threads  the main one */
+ * draw the budget so many times a second draws as much of it as it can. When the camera rests,
+ * pictures of more and more points follow, each drawn over as many frames as it takes while the one
+ * before stays on the screen, up to the budget. When nothing changes and nothing is loading,
+ * nothing is drawn. result   NULL: not wanted errors   MOSPT_EINVAL (options; no display),
+ * MOSPT_EIO (the driver was lost), MOSPT_ENOMEM threads  the main one */
 bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
                rend_view_result *result, mospt_err *err);

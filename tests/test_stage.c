@@ -84,7 +84,7 @@ static uint32_t converge(scene *s)
     mospt_err err = {0};
     uint32_t frames = 0;
     for (rend_progress progress = REND_AGAIN; progress != REND_SETTLED; frames++) {
-        CORE_NEED(rend_stage_frame(s->stage, &s->view, &progress, &err));
+        CORE_NEED(rend_stage_frame(s->stage, &s->view, NULL, &progress, &err));
         assert_true(frames < 1000000);
         if (progress == REND_WAITING) sched_yield();
     }
@@ -126,7 +126,7 @@ static void frames_converge_to_the_still(void **unused)
     start(&site, &limits, &s);
     assert_true(converge(&s) > 2); /* coarse nodes first */
     rgl_record before = rgl_null_record(s.gl);
-    CORE_NEED(rend_stage_frame(s.stage, &s.view, &progress, &err));
+    CORE_NEED(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err));
     rgl_record after = rgl_null_record(s.gl);
     rend_stage_figures(s.stage, &figures);
     assert_int_equal(progress, REND_SETTLED);
@@ -148,7 +148,7 @@ static rgl_record blended(const render_site *site, uint64_t gpu, bool frames)
     start(site, &limits, &s);
     s.view.look.blend_slab = 0.01f;
     CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
-    if (frames) CORE_NEED(rend_stage_frame(s.stage, &s.view, &progress, &err));
+    if (frames) CORE_NEED(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err));
     rgl_record record = rgl_null_record(s.gl);
     rend_stage_figures(s.stage, &figures);
     if (!frames) assert_int_equal(record.points_drawn, figures.points_drawn);
@@ -274,8 +274,163 @@ static uint64_t points_in_frame(scene *s)
     mospt_err err = {0};
     rend_progress progress;
     uint64_t before = rgl_null_record(s->gl).points_drawn;
-    CORE_NEED(rend_stage_frame(s->stage, &s->view, &progress, &err));
+    CORE_NEED(rend_stage_frame(s->stage, &s->view, NULL, &progress, &err));
     return rgl_null_record(s->gl).points_drawn - before;
+}
+
+/* One frame with an allowance; returns what it drew, in both rounds of blending. */
+static uint64_t part_of(scene *s, const rend_allowance *allowed, rend_progress *progress)
+{
+    mospt_err err = {0};
+    rgl_record before = rgl_null_record(s->gl);
+    CORE_NEED(rend_stage_frame(s->stage, &s->view, allowed, progress, &err));
+    rgl_record after = rgl_null_record(s->gl);
+    return after.points_drawn - before.points_drawn + after.points_again - before.points_again;
+}
+
+static uint32_t largest_node(const render_site *site)
+{
+    uint32_t largest = 0;
+    for (uint32_t n = 0; n < site->dataset->hierarchy.count; n++)
+        if (site->dataset->hierarchy.nodes[n].count > largest)
+            largest = site->dataset->hierarchy.nodes[n].count;
+    return largest;
+}
+
+static void a_picture_in_parts_is_the_same_picture(void **unused)
+{
+    (void)unused;
+    render_site site;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    const rend_limits limits = {0};
+    for (int blend = 0; blend < 2; blend++) {
+        scene s;
+        rend_progress progress;
+        rend_figures figures;
+        start(&site, &limits, &s);
+        s.view.look.blend_slab = blend ? 0.01f : 0;
+        converge(&s);
+        uint64_t all = part_of(&s, NULL, &progress);
+        rgl_record whole = rgl_null_record(s.gl);
+        for (uint64_t points = 1; points < 40000; points = 5 * points + 99) {
+            const rend_allowance allowed = {.points = points};
+            uint64_t most = points + largest_node(&site);
+            rgl_record before = rgl_null_record(s.gl);
+            uint32_t parts = 0;
+            do {
+                assert_true(part_of(&s, &allowed, &progress) <= most);
+                parts++;
+            } while (progress == REND_PART);
+            assert_int_equal(progress, REND_SETTLED);
+            assert_true(points >= all || parts > 1);
+            rgl_record now = rgl_null_record(s.gl);
+            assert_true(now.picture_hash == whole.picture_hash);
+            assert_true(now.again_hash == whole.again_hash);
+            assert_int_equal(now.begins, before.begins + 1);
+            assert_int_equal(now.ends, before.ends + 1);
+            rend_stage_figures(s.stage, &figures);
+            assert_int_equal(figures.points_drawn, now.points_drawn - before.points_drawn);
+        }
+        stop(&s);
+    }
+    render_site_fini(&site);
+}
+
+static void another_view_begins_another_picture(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    rend_progress progress;
+    const rend_limits limits = {0};
+    const rend_allowance allowed = {.points = 3000};
+    uint64_t state = 5;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    converge(&s);
+    part_of(&s, &allowed, &progress);
+    assert_int_equal(progress, REND_PART);
+    s.view.camera = render_camera_random(&site.dataset->metadata.grid, &state);
+    rgl_record before = rgl_null_record(s.gl);
+    part_of(&s, &allowed, &progress);
+    assert_int_equal(rgl_null_record(s.gl).begins, before.begins + 1);
+    converge(&s);
+    uint64_t picture = rgl_null_record(s.gl).picture_hash;
+    do
+        part_of(&s, &allowed, &progress);
+    while (progress == REND_PART);
+    assert_true(rgl_null_record(s.gl).picture_hash == picture);
+    stop(&s);
+    render_site_fini(&site);
+}
+
+static void uploads_of_a_frame_keep_to_what_is_allowed(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    const rend_limits limits = {0};
+    const rend_allowance allowed = {.points = 2000, .upload_bytes = 16000};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    for (rend_progress progress = REND_AGAIN; progress != REND_SETTLED;) {
+        uint64_t before = rgl_null_record(s.gl).points_uploaded;
+        part_of(&s, &allowed, &progress);
+        uint64_t uploaded = rgl_null_record(s.gl).points_uploaded - before;
+        assert_true(uploaded <= 1000 + largest_node(&site));
+        if (progress == REND_WAITING) sched_yield();
+    }
+    rend_figures figures;
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.uploaded_bytes, 16 * rgl_null_record(s.gl).points_uploaded);
+    assert_int_equal(figures.pending, 0);
+    stop(&s);
+    render_site_fini(&site);
+}
+
+/* The null backend says that there is a wall before everything, and then that there is none. */
+static void what_was_hidden_comes_back_when_the_wall_is_gone(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    rend_figures all, figures;
+    rend_progress progress;
+    const rend_limits limits = {0};
+    uint64_t state = 9;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    converge(&s);
+    rend_stage_figures(s.stage, &all);
+    s.view.budget_points = all.points_drawn / 2; /* what exceeds it is worth looking behind */
+    converge(&s);
+    rend_stage_figures(s.stage, &all);
+    assert_int_equal(all.nodes_hidden, 0);
+    assert_true(all.budget_spent);
+    for (int moves = 0; moves < 2; moves++) {
+        rgl_null_set_depth(s.gl, 0);
+        if (moves) s.view.camera.target[0] += 0.5;
+        else s.view.look.point_px = 2; /* drawn otherwise */
+        converge(&s);
+        rend_stage_figures(s.stage, &figures);
+        assert_true(figures.nodes_hidden > 0 && figures.points_drawn < all.points_drawn);
+        rgl_null_set_depth(s.gl, 1);
+        if (moves) s.view.camera = render_camera_random(&site.dataset->metadata.grid, &state);
+        else s.view.look.point_px = 3;
+        part_of(&s, NULL, &progress);
+        rend_stage_figures(s.stage, &figures);
+        assert_true(figures.nodes_hidden == 0 || progress != REND_SETTLED);
+        converge(&s);
+        rend_stage_figures(s.stage, &figures);
+        assert_int_equal(figures.nodes_hidden, 0);
+    }
+    s.view.no_occlusion = true;
+    rgl_null_set_depth(s.gl, 0);
+    converge(&s);
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.nodes_hidden, 0);
+    stop(&s);
+    render_site_fini(&site);
 }
 
 static const rend_look LOOKS[] = {
@@ -371,7 +526,7 @@ static void colours_that_cannot_be_shown_change_nothing(void **unused)
     converge(&s);
     uint64_t before = rgl_null_record(s.gl).picture_hash;
     s.view.look.colour = REND_COLOUR_TIME;
-    CORE_FAILS(rend_stage_frame(s.stage, &s.view, &progress, &err), MOSPT_EINVAL);
+    CORE_FAILS(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err), MOSPT_EINVAL);
     CORE_FAILS(rend_stage_still(s.stage, &s.view, &err), MOSPT_EINVAL);
     s.view.look.colour = REND_COLOUR_RGB;
     converge(&s);
@@ -421,6 +576,10 @@ int main(void)
         cmocka_unit_test(repainted_points_are_those_of_a_fresh_start),
         cmocka_unit_test(colours_that_cannot_be_shown_change_nothing),
         cmocka_unit_test(damaged_attributes_are_damage_only_where_they_are_shown),
+        cmocka_unit_test(a_picture_in_parts_is_the_same_picture),
+        cmocka_unit_test(another_view_begins_another_picture),
+        cmocka_unit_test(uploads_of_a_frame_keep_to_what_is_allowed),
+        cmocka_unit_test(what_was_hidden_comes_back_when_the_wall_is_gone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
