@@ -350,6 +350,7 @@ static bool read_real_float(const char *v, double low, double high, float *out)
 
 static bool o_blend(cli_options *o, const char *v)
 {
+    o->has_blend = true;
     return read_real_float(v, 0, 1, &o->look.blend_slab) &&
            (o->look.blend_slab == 0 || o->look.blend_slab >= 1e-4f);
 }
@@ -571,8 +572,9 @@ static const struct {
     {"shape", "NAME", 0, V | S | R, o_shape,
      "of splats: square, round, paraboloid (they cut each other sharply) or auto (default)"},
     {"blend", "SHARE", 0, V | S | R, o_blend,
-     "average points up to this share of the distance behind the nearest, as in 0.01; for noisy "
-     "scans (default: 0)"},
+     "average points up to this share of the distance behind the nearest; 0 shows the nearest "
+     "alone "
+     "(default: 0.01 in pictures and films, else 0; 0 where points have a size in pixels)"},
     {"fill", "PX", 0, V | S | R, o_fill,
      "close holes in near surfaces from so many pixels around, up to 8 (default: 0)"},
     {"color", "BY", 0, V | S | R, o_colour,
@@ -668,6 +670,16 @@ static bool misuse(mospt_err *err, const char *format, const char *what, const c
     return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), format, what, more);
 }
 
+/* Pictures that nobody waits for are drawn twice, so that noisy scans do not sparkle. A window, or
+ * a film of what it would show, spends the time on more points; and whoever wants points of so many
+ * pixels wants to see points. */
+static void choose_blending(cli_options *o)
+{
+    bool still = o->command == CLI_SHOT || (o->command == CLI_RECORD && !o->film.live);
+    if (still && !o->has_blend && o->look.size_mode != REND_SIZE_FIXED)
+        o->look.blend_slab = REND_BLEND_DEFAULT;
+}
+
 bool cli_options_read(cli_command command, int argc, char **argv, cli_options *out, mospt_err *err)
 {
     struct option list[OPTION_COUNT + 1] = {{0}};
@@ -703,6 +715,7 @@ bool cli_options_read(cli_command command, int argc, char **argv, cli_options *o
             break;
         }
     }
+    choose_blending(&o);
     o.paths = (const char *const *)(argv + optind);
     o.path_count = (size_t)(argc - optind);
     *out = o;

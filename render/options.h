@@ -95,6 +95,7 @@ typedef struct {
 } rend_look;
 
 #define REND_POINT_PX_MAX_DEFAULT 6.0f
+#define REND_BLEND_DEFAULT 0.01f /* of pictures that nobody waits for */
 #define REND_FILL_PX_MAX 8
 
 typedef struct {

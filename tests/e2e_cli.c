@@ -222,6 +222,15 @@ static void colours_that_are_not_there_are_wrong_use(void **state)
         "shot a.las -q -o x.png --color elevation --color-map rainbow",
         "shot a.las -q -o x.png --brightness 0",
         "shot a.las -q -o x.png --gamma x",
+        "shot a.las -q -o x.png --shape cube",
+        "shot a.las -q -o x.png --blend 2",
+        "shot a.las -q -o x.png --fill 9",
+        "shot a.las -q -o x.png --edl-strength -1",
+        "shot a.las -q -o x.png --edl-radius 0",
+        "shot a.las -q -o x.png --point-min 0",
+        "shot a.las -q -o x.png --background puce",
+        "shot a.las -q -o x.png --background 12345",
+        "shot a.las -q -o x.png --background white,",
         "view a.las -q --color time",
     };
     (void)state;
