@@ -491,6 +491,7 @@ static rend_select_input input_of(rend_stage *s, const rend_view_of *view)
                                .frame = &s->frame,
                                .budget_points = view->budget_points,
                                .min_node_px = view->min_node_px,
+                               .cell_px = view->cell_px,
                                .page_points = PAGE_POINTS,
                                .clip = view->look.has_clip ? &s->clip : NULL};
 }

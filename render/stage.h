@@ -23,6 +23,7 @@ typedef struct {
     rend_look look;
     uint64_t budget_points; /* REND_ALL: no limit */
     float min_node_px;      /* 0: see render/select.h */
+    float cell_px;          /* likewise */
     bool no_occlusion;      /* nodes hidden behind others are drawn, too */
     int parts;              /* RGL_TO_WINDOW or 0 */
 } rend_view_of;

@@ -1,0 +1,555 @@
+/* How fast pictures are drawn, and how good they are; scripts/bench_render explains. */
+#include "render/curve.h"
+#include "render/engine.h"
+#include "render/stage.h"
+#include "render/tour.h"
+#include "scripts/bench_picture.h"
+#include "scripts/bench_points.h"
+#include "scripts/plain_loop.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { SHARES = 6, BUDGETS = 5, SAMPLES = 8, REPEATS = 3 };
+static const double SHARE[SHARES] = {0.01, 0.02, 0.05, 0.1, 0.25, 0.5};
+
+typedef struct {
+    const char *dataset;
+    rend_engine_options engine;
+    uint32_t width, height, frames, views, threads;
+    uint64_t budget_points;
+    rend_look look;
+    float cell_px;
+    bool no_occlusion, speed, quality;
+} options;
+
+typedef struct {
+    const options *o;
+    mospt_dataset *dataset;
+    bench_points points;
+    rend_engine engine, second; /* the second one draws points as they are */
+    rgl *raw;
+    rend_selector *selector;
+    plain_loop *loop;
+    rend_curve *orbit, *walk; /* outside, inside */
+    double orbit_s, walk_s;
+} bench;
+
+static double now_ms(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* ---- the flight: half of it around the site, half of it through it ---- */
+
+static bool make_curve(rend_path *path, rend_curve **out, double *duration_s, mospt_err *err)
+{
+    *duration_s = rend_path_duration(path);
+    bool ok = rend_curve_create(path, out, err);
+    rend_path_fini(path);
+    return ok;
+}
+
+static bool make_flight(bench *b, mospt_err *err)
+{
+    rend_path path;
+    double aspect = (double)b->o->width / b->o->height;
+    return rend_tour_orbit(b->dataset, aspect, &path, err) &&
+           make_curve(&path, &b->orbit, &b->orbit_s, err) &&
+           rend_tour_walk(b->dataset, &path, err) && make_curve(&path, &b->walk, &b->walk_s, err);
+}
+
+/* t, 0 to 1; later_s after that */
+static rend_camera camera_at(const bench *b, double t, double later_s)
+{
+    rend_moment moment;
+    if (t < 0.5) rend_curve_at(b->orbit, 2 * t * b->orbit_s + later_s, &moment);
+    else rend_curve_at(b->walk, (2 * t - 1) * b->walk_s + later_s, &moment);
+    return moment.camera;
+}
+
+static rend_view_of view_at(const bench *b, double t, double later_s, uint64_t budget)
+{
+    return (rend_view_of){.camera = camera_at(b, t, later_s),
+                          .width = b->o->width,
+                          .height = b->o->height,
+                          .look = b->o->look,
+                          .budget_points = budget,
+                          .cell_px = b->o->cell_px,
+                          .no_occlusion = b->o->no_occlusion};
+}
+
+/* ---- points as they are ---- */
+
+/* What render/stage.c makes of the usual look, at one pixel a point. */
+static rgl_scene plain_scene(const bench *b, const rend_frame *frame)
+{
+    const rend_look *look = &b->o->look;
+    return (rgl_scene){.frame = *frame,
+                       .grid_bits = b->dataset->metadata.grid.bits,
+                       .px_min = 1,
+                       .px_max = 1,
+                       .blend_slab = look->blend_slab,
+                       .fill_px = look->fill_px,
+                       .edl_strength = look->no_edl ? 0 : 24,
+                       .edl_radius_px = fmaxf(1, (float)frame->height / 720),
+                       .background_top = {0.36f, 0.39f, 0.43f},
+                       .background_bottom = {0.20f, 0.21f, 0.23f}};
+}
+
+/* sizes    of a selection of everything; NULL: all points are one pixel wide */
+static bool draw_raw(bench *b, const rend_frame *frame, const rend_selection *sizes,
+                     const int32_t *first, const int32_t *count, uint32_t ranges, mospt_err *err)
+{
+    const rgl_batch batch = {.shape = sizes != NULL ? RGL_ROUND : RGL_SQUARE,
+                             .smallest = sizes == NULL,
+                             .first = first,
+                             .count = count,
+                             .range_count = ranges};
+    rgl_scene scene = plain_scene(b, frame);
+    if (sizes != NULL) {
+        scene.octants = sizes->octants, scene.octant_nodes = sizes->draw_count;
+        scene.splat_scale = 1.25f, scene.px_max = REND_POINT_PX_MAX_DEFAULT;
+    }
+    int parts = RGL_BEGIN | RGL_END | (scene.blend_slab > 0 ? RGL_AGAIN : 0);
+    return rgl_draw(b->raw, &scene, &batch, 1, parts, err);
+}
+
+/* Waits for all that was drawn. */
+static bool finish(rgl *gl, mospt_err *err)
+{
+    float depth;
+    return rgl_read_depth(gl, 0, 0, 0, &depth, err);
+}
+
+/* ---- speed ---- */
+
+typedef struct {
+    double points, one_ms, many_ms, plain_ms; /* of the raw limits */
+} limits_of;
+
+static bool time_raw(bench *b, const rend_frame *frame, const int32_t *first, const int32_t *count,
+                     uint32_t ranges, double *sum_ms, mospt_err *err)
+{
+    double best = 1e30;
+    for (int k = 0; k < REPEATS; k++) {
+        double start = now_ms();
+        if (!draw_raw(b, frame, NULL, first, count, ranges, err) || !finish(b->raw, err))
+            return false;
+        best = fmin(best, now_ms() - start);
+    }
+    *sum_ms += best;
+    return true;
+}
+
+static bool add_limits(bench *b, const rend_frame *frame, const rend_selection *s,
+                       mospt_vertex *vertices, limits_of *out, mospt_err *err)
+{
+    int32_t whole = 0, points = (int32_t)s->points;
+    int32_t *first = malloc((s->draw_count + 1) * sizeof *first),
+            *count = malloc((s->draw_count + 1) * sizeof *count);
+    bool ok = (first != NULL && count != NULL) || mospt_err_nomem(err, s->draw_count);
+    for (uint32_t i = 0, at = 0; ok && i < s->draw_count; at += s->draws[i++].count)
+        first[i] = (int32_t)at, count[i] = (int32_t)s->draws[i].count;
+    bench_points_gather(&b->points, s, vertices);
+    ok = ok && rgl_arena_upload(b->raw, 0, vertices, (uint32_t)points, err) &&
+         time_raw(b, frame, &whole, &points, 1, &out->one_ms, err) &&
+         time_raw(b, frame, first, count, s->draw_count, &out->many_ms, err);
+    double best = 1e30;
+    for (int k = 0; k < REPEATS && ok; k++) {
+        double start = now_ms();
+        plain_loop_draw(b->loop, frame, vertices, (uint32_t)points);
+        best = fmin(best, now_ms() - start);
+    }
+    out->plain_ms += best;
+    out->points += (double)s->points;
+    free(first), free(count);
+    return ok;
+}
+
+/* The same points as ours in a buffer, at some places of the flight. */
+static bool find_limits(bench *b, limits_of *out, mospt_err *err)
+{
+    uint32_t low[3], high[3];
+    uint64_t most = b->o->budget_points < b->points.count ? b->o->budget_points : b->points.count;
+    mospt_vertex *vertices = malloc(most * sizeof *vertices);
+    bool ok = vertices != NULL || mospt_err_nomem(err, most * sizeof *vertices);
+    *out = (limits_of){0};
+    rend_frame_bounds(b->dataset, low, high);
+    ok = ok && rgl_arena_create(b->raw, most, err);
+    for (int i = 0; i < SAMPLES && ok; i++) {
+        rend_frame frame;
+        const rend_selection *s;
+        rend_camera camera = camera_at(b, (i + 0.5) / SAMPLES, 0);
+        const mospt_grid *grid = &b->dataset->metadata.grid;
+        rend_frame_make(&camera, grid, low, high, b->o->width, b->o->height, &frame);
+        const rend_select_input input = {.hierarchy = &b->dataset->hierarchy,
+                                         .grid = grid,
+                                         .frame = &frame,
+                                         .budget_points = b->o->budget_points,
+                                         .cell_px = b->o->cell_px};
+        ok = rend_select_run(b->selector, &input, &s, err) &&
+             add_limits(b, &frame, s, vertices, out, err);
+    }
+    free(vertices);
+    return ok;
+}
+
+typedef struct {
+    double points, ms, median_ms, p99_ms, missing, hidden, nodes;
+    uint64_t loaded_bytes, uploaded_bytes;
+} flown;
+
+static bool fly(bench *b, rend_stage *stage, bool settle, bool no_occlusion, flown *out,
+                mospt_err *err)
+{
+    uint32_t n = b->o->frames;
+    double *ms = calloc(n, sizeof *ms);
+    rend_figures f = {0}, before;
+    bool ok = ms != NULL || mospt_err_nomem(err, n);
+    *out = (flown){0};
+    rend_stage_figures(stage, &before);
+    for (uint32_t i = 0; i < n && ok; i++) {
+        rend_progress progress = REND_AGAIN;
+        rend_view_of view = view_at(b, (i + 0.5) / n, 0, b->o->budget_points);
+        view.no_occlusion = no_occlusion;
+        do {
+            double start = now_ms();
+            ok = rend_stage_frame(stage, &view, NULL, &progress, err) && finish(b->engine.gl, err);
+            ms[i] = now_ms() - start;
+            if (settle && progress == REND_WAITING) usleep(1000);
+        } while (ok && settle && progress != REND_SETTLED);
+        rend_stage_figures(stage, &f);
+        out->points += (double)f.points_drawn, out->ms += ms[i];
+        out->missing += f.pending, out->hidden += f.nodes_hidden, out->nodes += f.nodes_drawn;
+    }
+    out->loaded_bytes = f.loaded_bytes - before.loaded_bytes;
+    out->uploaded_bytes = f.uploaded_bytes - before.uploaded_bytes;
+    if (ok) {
+        qsort(ms, n, sizeof *ms, compare);
+        out->median_ms = ms[n / 2], out->p99_ms = ms[n * 99 / 100];
+    }
+    free(ms);
+    return ok;
+}
+
+static void print_flown(const char *name, const flown *f, const limits_of *l, uint32_t frames)
+{
+    double ours = f->points / f->ms * 1e-3, raw = l->points / fmin(l->one_ms, l->many_ms) * 1e-3,
+           plain = l->points / l->plain_ms * 1e-3;
+    printf("%-12s %7.1f %6.2f %6.2f %8.1f %8.1f %7.2f %7.0f %7.1f %8.1f %8.1f\n", name, ours,
+           ours / raw, ours / plain, f->median_ms, f->p99_ms, f->points / frames * 1e-6,
+           f->nodes / frames, f->missing / frames, (double)f->loaded_bytes * 1e-6,
+           (double)f->uploaded_bytes * 1e-6);
+}
+
+/* Everything resident, then with a GPU cache of a tenth and nothing read yet. */
+static bool measure_speed(bench *b, mospt_err *err)
+{
+    limits_of l;
+    flown settled, resident, all, paging;
+    rend_stage *stage = NULL;
+    uint64_t size = b->points.count * sizeof(mospt_vertex) * 5 / 4 + 64 * REND_MIB;
+    uint32_t n = b->o->frames;
+    if (!find_limits(b, &l, err) || !rgl_arena_create(b->raw, 1, err)) return false;
+    const rend_limits large = {.ram_cache_bytes = 1, .gpu_cache_bytes = size},
+                      small = {.gpu_cache_bytes = size / 10};
+    bool ok = rend_stage_create(b->dataset, b->engine.gl, &large, NULL, NULL, &stage, err) &&
+              fly(b, stage, true, true, &settled, err) && fly(b, stage, false, true, &all, err) &&
+              fly(b, stage, false, false, &resident, err);
+    rend_stage_destroy(stage);
+    stage = NULL;
+    ok = ok && rend_stage_create(b->dataset, b->engine.gl, &small, NULL, NULL, &stage, err) &&
+         fly(b, stage, false, b->o->no_occlusion, &paging, err);
+    rend_stage_destroy(stage);
+    if (!ok) return false;
+    printf(
+        "limits: M points/s: one draw %.1f, a draw per node %.1f, plain loop on %u threads %.1f\n",
+        l.points / l.one_ms * 1e-3, l.points / l.many_ms * 1e-3, b->o->threads,
+        l.points / l.plain_ms * 1e-3);
+    printf("%-12s %7s %6s %6s %8s %8s %7s %7s %7s %8s %8s\n", "", "M p/s", "/raw", "/plain",
+           "med ms", "p99 ms", "M pts", "nodes", "misses", "MB read", "MB up");
+    print_flown("resident", &all, &l, n);
+    if (!b->o->no_occlusion) print_flown("+ occlusion", &resident, &l, n);
+    print_flown("paging 1/10", &paging, &l, n);
+    if (!b->o->no_occlusion)
+        printf("occlusion: %.0f %% fewer points\n", 100 * (1 - resident.points / all.points));
+    return true;
+}
+
+/* ---- quality ---- */
+
+typedef struct {
+    float *luminance[2], *depth; /* owned; two: a moment later */
+} picture;
+
+typedef struct {
+    double similarity, missing, flicker, points;
+} quality;
+
+static void picture_fini(picture *p)
+{
+    free(p->luminance[0]), free(p->luminance[1]), free(p->depth);
+}
+
+static bool picture_init(picture *p, uint32_t pixels, mospt_err *err)
+{
+    *p = (picture){.luminance = {malloc(pixels * sizeof(float)), malloc(pixels * sizeof(float))},
+                   .depth = malloc(pixels * sizeof(float))};
+    return (p->luminance[0] != NULL && p->luminance[1] != NULL && p->depth != NULL) ||
+           mospt_err_nomem(err, pixels * sizeof(float));
+}
+
+static bool read_picture(const bench *b, rgl *gl, picture *p, int moment, mospt_err *err)
+{
+    uint32_t pixels = b->o->width * b->o->height;
+    uint8_t *rgb = malloc(3 * (size_t)pixels);
+    if (rgb == NULL) return mospt_err_nomem(err, 3 * (size_t)pixels);
+    bool ok = (moment > 0 || rgl_read_depths(gl, p->depth, err)) &&
+              rgl_read_pixels(gl, false, b->o->width, b->o->height, rgb, err);
+    if (ok) bench_luminance(rgb, pixels, p->luminance[moment]);
+    free(rgb);
+    return ok;
+}
+
+/* Everything in view, with its splat sizes. */
+static bool select_all(bench *b, const rend_frame *frame, const rend_selection **out,
+                       mospt_err *err)
+{
+    const rend_select_input input = {.hierarchy = &b->dataset->hierarchy,
+                                     .grid = &b->dataset->metadata.grid,
+                                     .frame = frame,
+                                     .budget_points = REND_ALL,
+                                     .cell_px = 0.001f};
+    return rend_select_run(b->selector, &input, out, err);
+}
+
+/* The first `share` of the shuffled points. */
+static bool take_share(bench *b, double t, double share, picture *out, mospt_err *err)
+{
+    uint32_t low[3], high[3];
+    int32_t first = 0, count = (int32_t)(share * (double)b->points.count);
+    rend_frame_bounds(b->dataset, low, high);
+    for (int moment = 0; moment < 2; moment++) {
+        rend_frame frame;
+        const rend_selection *sizes = NULL;
+        rend_camera camera = camera_at(b, t, moment / 30.0);
+        rend_frame_make(&camera, &b->dataset->metadata.grid, low, high, b->o->width, b->o->height,
+                        &frame);
+        if (b->o->look.size_mode == REND_SIZE_AUTO && !select_all(b, &frame, &sizes, err))
+            return false;
+        if (!draw_raw(b, &frame, sizes, &first, &count, 1, err) ||
+            !read_picture(b, b->raw, out, moment, err))
+            return false;
+    }
+    return true;
+}
+
+static bool take_ours(bench *b, rend_stage *stage, double t, double share, picture *out,
+                      uint64_t *points, mospt_err *err)
+{
+    for (int moment = 0; moment < 2; moment++) {
+        rend_view_of view =
+            view_at(b, t, moment / 30.0, (uint64_t)(share * (double)b->points.count));
+        rend_figures f;
+        if (!rend_stage_still(stage, &view, err) ||
+            !read_picture(b, b->engine.gl, out, moment, err))
+            return false;
+        rend_stage_figures(stage, &f);
+        *points = f.points_drawn;
+    }
+    return true;
+}
+
+static void judge(const bench *b, const picture *full, const picture *ours, uint64_t points,
+                  quality *sum)
+{
+    uint32_t pixels = b->o->width * b->o->height;
+    const float *f[2] = {full->luminance[0], full->luminance[1]},
+                *p[2] = {ours->luminance[0], ours->luminance[1]};
+    sum->similarity += bench_similarity(f[0], p[0], b->o->width, b->o->height) / b->o->views;
+    sum->missing += bench_missing(full->depth, ours->depth, pixels) / b->o->views;
+    sum->flicker += bench_flicker(f, p, pixels) / b->o->views;
+    sum->points += (double)points / b->o->views;
+}
+
+/* The random share that is as similar, by the logarithm between two. */
+static double share_like(double similarity, const quality *random)
+{
+    if (similarity < random[0].similarity) return 0;
+    for (int i = 1; i < SHARES; i++) {
+        double a = random[i - 1].similarity, z = random[i].similarity;
+        if (similarity < z)
+            return SHARE[i - 1] * pow(SHARE[i] / SHARE[i - 1], (similarity - a) / (z - a));
+    }
+    return SHARE[SHARES - 1];
+}
+
+static void print_quality(const char *kind, double share, const quality *q, const quality *random)
+{
+    printf("%-7s %4.0f %%  %10.4f %9.2f %9.2f %9.2f", kind, 100 * share, q->similarity,
+           100 * q->missing, q->flicker, q->points * 1e-6);
+    if (random != NULL) {
+        double like = share_like(q->similarity, random);
+        printf("   %s%.1f %%",
+               like <= 0     ? "< "
+               : like >= 0.5 ? ">= "
+                             : "",
+               100 * (like > 0 ? like : SHARE[0]));
+    }
+    printf("\n");
+}
+
+static bool judge_view(bench *b, rend_stage *stage, double t, picture *full, picture *ours,
+                       quality *random, quality *budget, mospt_err *err)
+{
+    uint64_t points;
+    if (!take_share(b, t, 1, full, err)) return false;
+    for (int i = 0; i < SHARES; i++) {
+        if (!take_share(b, t, SHARE[i], ours, err)) return false;
+        judge(b, full, ours, (uint64_t)(SHARE[i] * (double)b->points.count), &random[i]);
+    }
+    for (int i = 0; i < BUDGETS; i++) {
+        if (!take_ours(b, stage, t, SHARE[i], ours, &points, err)) return false;
+        judge(b, full, ours, points, &budget[i]);
+    }
+    return true;
+}
+
+static bool measure_quality(bench *b, mospt_err *err)
+{
+    quality random[SHARES] = {{0}}, budget[BUDGETS] = {{0}};
+    picture full = {0}, ours = {0};
+    rend_stage *stage = NULL;
+    uint32_t pixels = b->o->width * b->o->height;
+    const rend_limits limits = {.ram_cache_bytes = 1, .gpu_cache_bytes = 4096 * REND_MIB};
+    bench_points_shuffle(&b->points);
+    bool ok = rgl_arena_create(b->raw, b->points.count, err);
+    for (uint64_t i = 0, n; i < b->points.count && ok; i += n) {
+        n = b->points.count - i < 1 << 24 ? b->points.count - i : 1 << 24;
+        ok = rgl_arena_upload(b->raw, i, b->points.vertices + i, (uint32_t)n, err);
+    }
+    free(b->points.vertices);
+    b->points.vertices = NULL;
+    ok = ok && picture_init(&full, pixels, err) && picture_init(&ours, pixels, err) &&
+         rend_stage_create(b->dataset, b->engine.gl, &limits, NULL, NULL, &stage, err);
+    for (uint32_t v = 0; v < b->o->views && ok; v++)
+        ok = judge_view(b, stage, (v + 0.5) / b->o->views, &full, &ours, random, budget, err);
+    if (ok) {
+        printf("%-14s %10s %9s %9s %9s   %s\n", "", "similarity", "missing %", "flicker",
+               "M points", "equals random");
+        for (int i = 0; i < SHARES; i++)
+            print_quality("random", SHARE[i], &random[i], NULL);
+        for (int i = 0; i < BUDGETS; i++)
+            print_quality("budget", SHARE[i], &budget[i], random);
+    }
+    rend_stage_destroy(stage);
+    picture_fini(&full), picture_fini(&ours);
+    return ok;
+}
+
+/* ---- */
+
+static bool open_engines(bench *b, mospt_err *err)
+{
+    if (!rend_engine_open(&b->o->engine, &b->engine, err)) return false;
+    printf("%s, %ux%u, %.1f M points, budget %.1f M, %u frames\n", rgl_renderer(b->engine.gl),
+           b->o->width, b->o->height, (double)b->points.count * 1e-6,
+           (double)b->o->budget_points * 1e-6, b->o->frames);
+    if (b->engine.context != NULL) return rgl_gl_create(&b->raw, err);
+    if (!rend_engine_open(&b->o->engine, &b->second, err)) return false;
+    b->raw = b->second.gl;
+    return true;
+}
+
+static bool run(const options *o, mospt_err *err)
+{
+    bench b = {.o = o};
+    b.selector = rend_select_create();
+    b.loop = plain_loop_create(o->width, o->height, o->threads);
+    if (b.selector == NULL || b.loop == NULL) return mospt_err_nomem(err, 0);
+    bool ok = mospt_dataset_open(o->dataset, &b.dataset, err) &&
+              bench_points_load(b.dataset, &b.points, err) && make_flight(&b, err) &&
+              open_engines(&b, err) && (!o->speed || measure_speed(&b, err)) &&
+              (!o->quality || measure_quality(&b, err));
+    if (b.raw != b.second.gl) rgl_destroy(b.raw);
+    rend_engine_close(&b.second);
+    rend_engine_close(&b.engine);
+    rend_select_destroy(b.selector);
+    plain_loop_destroy(b.loop);
+    rend_curve_destroy(b.orbit);
+    rend_curve_destroy(b.walk);
+    bench_points_fini(&b.points);
+    mospt_dataset_close(b.dataset);
+    return ok;
+}
+
+static bool set_option(options *o, const char *name, const char *value)
+{
+    if (strcmp(name, "--budget") == 0) o->budget_points = (uint64_t)atof(value);
+    else if (strcmp(name, "--frames") == 0) o->frames = (uint32_t)atol(value);
+    else if (strcmp(name, "--views") == 0) o->views = (uint32_t)atol(value);
+    else if (strcmp(name, "--threads") == 0) o->engine.threads = o->threads = (uint32_t)atol(value);
+    else if (strcmp(name, "--cell") == 0) o->cell_px = (float)atof(value);
+    else if (strcmp(name, "--blend") == 0) o->look.blend_slab = (float)(atof(value) / 100);
+    else if (strcmp(name, "--fill") == 0) o->look.fill_px = (uint32_t)atol(value);
+    else if (strcmp(name, "--size") == 0) return sscanf(value, "%ux%u", &o->width, &o->height) == 2;
+    else if (strcmp(name, "--renderer") == 0)
+        o->engine.renderer = strcmp(value, "gl") == 0 ? REND_RENDERER_GL : REND_RENDERER_CPU;
+    else if (strcmp(name, "--point-size") == 0) {
+        o->look.size_mode = strcmp(value, "auto") == 0 ? REND_SIZE_AUTO : REND_SIZE_FIXED;
+        o->look.point_px = (float)atof(value);
+    } else return false;
+    return true;
+}
+
+static bool parse(int argc, char **argv, options *o)
+{
+    for (int i = 1; i < argc; i++) {
+        if (strcmp(argv[i], "--no-edl") == 0) o->look.no_edl = true;
+        else if (strcmp(argv[i], "--no-occlusion") == 0) o->no_occlusion = true;
+        else if (strcmp(argv[i], "--speed") == 0) o->quality = false;
+        else if (strcmp(argv[i], "--quality") == 0) o->speed = false;
+        else if (argv[i][0] != '-') o->dataset = argv[i];
+        else if (i + 1 >= argc || !set_option(o, argv[i], argv[i + 1])) return false;
+        else i++;
+    }
+    return o->dataset != NULL && o->frames > 0 && o->views > 0 && o->width > 0 && o->height > 0 &&
+           o->threads > 0 && o->budget_points > 0 && (o->speed || o->quality);
+}
+
+int main(int argc, char **argv)
+{
+    options o = {.width = 1280,
+                 .height = 720,
+                 .frames = 100,
+                 .views = 20,
+                 .threads = 2,
+                 .budget_points = 2000000,
+                 .engine = {.renderer = REND_RENDERER_CPU, .threads = 2},
+                 .look = {.size_mode = REND_SIZE_FIXED, .point_px = 1},
+                 .speed = true,
+                 .quality = true};
+    mospt_err err = {0};
+    if (!parse(argc, argv, &o)) {
+        fprintf(stderr, "bench_render: see scripts/bench_render\n");
+        return 2;
+    }
+    if (run(&o, &err)) return 0;
+    char text[2048];
+    mospt_err_text(&err, text, sizeof text);
+    fprintf(stderr, "bench_render: %s\n", text);
+    return 1;
+}
