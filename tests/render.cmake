@@ -19,7 +19,7 @@ foreach(name cache camera clip curve loader occlusion orbit pace pages paint pan
 endforeach()
 
 # The back end on the processor beside OpenGL's.
-add_executable(test_cpu keep_libraries.c test_cpu.c)
+add_executable(test_cpu keep_libraries.c ref_raster.c test_cpu.c)
 target_link_libraries(test_cpu PRIVATE render_tools)
 add_test(NAME cpu COMMAND test_cpu)
 set_tests_properties(cpu PROPERTIES LABELS render TIMEOUT 300 ENVIRONMENT "${render_environment}")
