@@ -14,30 +14,47 @@ static lanes_i pixels_of(const rcpu_view *v, const rcpu_places *p)
     return lanes_pick_i(shown, row * (int32_t)v->size.stride + column, (lanes_i){0} + nowhere);
 }
 
-static inline void draw_block(const rcpu_view *v, const mospt_vertex *vertices, int64_t *frame)
+/* Places first, pixels afterwards: which of them are nearer cannot be foretold, and the more places
+ * are known by then, the less a wrong guess costs. */
+enum { BLOCK = 64 };
+
+/* Returns whether any of them is in the view. */
+static bool place_block(const rcpu_view *v, const mospt_vertex *vertices, int64_t keys[BLOCK],
+                        int32_t at[BLOCK])
 {
-    rcpu_block block = rcpu_load(vertices);
-    rcpu_places places = rcpu_project(v, &block);
-    lanes_i pixels = pixels_of(v, &places);
-    int64_t keys[RCPU_LANES];
-    int32_t at[RCPU_LANES];
-    rcpu_keys(places.w, block.colour, keys);
-    memcpy(at, &pixels, sizeof pixels);
-    for (uint32_t k = 0; k < RCPU_LANES; k++) {
-        int64_t *pixel = &frame[at[rcpu_key_lane(k)]];
-        if (keys[k] < *pixel) *pixel = keys[k];
+    lanes_i any = {0};
+    for (uint32_t i = 0; i < BLOCK; i += RCPU_LANES) {
+        rcpu_block block = rcpu_load(vertices + i);
+        rcpu_places places = rcpu_project(v, &block);
+        lanes_i pixels = pixels_of(v, &places);
+        rcpu_keys(places.w, block.colour, keys + i);
+        memcpy(at + i, &pixels, sizeof pixels);
+        any |= places.inside;
     }
+    return lanes_any(any);
+}
+
+static void draw_block(const rcpu_view *v, const mospt_vertex *vertices, int64_t *frame)
+{
+    int64_t keys[BLOCK];
+    int32_t at[BLOCK];
+    if (!place_block(v, vertices, keys, at)) return;
+    for (uint32_t i = 0; i < BLOCK; i += RCPU_LANES)
+        for (uint32_t k = 0; k < RCPU_LANES; k++) {
+            int64_t *pixel = &frame[at[i + rcpu_key_lane(k)]];
+            if (keys[i + k] < *pixel) *pixel = keys[i + k];
+        }
 }
 
 void RCPU_NAME(points)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                        int64_t *frame)
 {
     uint32_t i = 0;
-    for (; i + RCPU_LANES <= count; i += RCPU_LANES)
+    for (; i + BLOCK <= count; i += BLOCK)
         draw_block(view, vertices + i, frame);
     if (i == count) return;
-    mospt_vertex last[RCPU_LANES];
-    for (uint32_t k = 0; k < RCPU_LANES; k++)
+    mospt_vertex last[BLOCK];
+    for (uint32_t k = 0; k < BLOCK; k++)
         last[k] = vertices[i + k < count ? i + k : i]; /* the same one twice changes nothing */
     draw_block(view, last, frame);
 }
