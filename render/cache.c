@@ -120,6 +120,31 @@ void rend_cache_unpin(rend_cache *cache, uint32_t node)
     if (--e->pins == 0) cache->pinned -= e->size;
 }
 
+bool rend_cache_renumber(rend_cache *cache, const uint32_t *to, uint32_t node_count, uint64_t limit,
+                         mospt_err *err)
+{
+    assert(cache->pinned == 0);
+    rend_cache old = *cache;
+    entry *entries = calloc((size_t)node_count + 1, sizeof *entries);
+    if (entries == NULL) return mospt_err_nomem(err, node_count * sizeof *entries);
+    for (uint32_t node = old.entries[old.head].previous; node != old.head;) {
+        uint32_t newer = old.entries[node].previous;
+        if (to[node] == UINT32_MAX) evict(cache, node);
+        node = newer;
+    }
+    cache->entries = entries, cache->head = node_count, cache->limit = limit;
+    entries[node_count].previous = entries[node_count].next = node_count;
+    for (uint32_t node = old.entries[old.head].previous; node != old.head;
+         node = old.entries[node].previous) {
+        entries[to[node]] = old.entries[node];
+        link_first(cache, to[node]);
+    }
+    free(old.entries);
+    while (cache->used > limit)
+        evict(cache, cache->entries[cache->head].previous);
+    return true;
+}
+
 void rend_cache_drop(rend_cache *cache, uint32_t node)
 {
     if (rend_cache_has(cache, node)) evict(cache, node);

@@ -36,6 +36,13 @@ bool rend_cache_has(const rend_cache *cache, uint32_t node);
 void rend_cache_pin(rend_cache *cache, uint32_t node);
 void rend_cache_unpin(rend_cache *cache, uint32_t node);
 
+/* Gives entries other numbers, and the cache another limit; what has none, or does not fit, is
+ * evicted. Nothing may be pinned.
+ * to       [node count so far] new numbers, each once, or UINT32_MAX
+ * errors   MOSPT_ENOMEM: nothing has changed */
+bool rend_cache_renumber(rend_cache *cache, const uint32_t *to, uint32_t node_count, uint64_t limit,
+                         mospt_err *err);
+
 /* Evicts one entry, pinned or not, if it is there; or all that are not pinned. */
 void rend_cache_drop(rend_cache *cache, uint32_t node);
 void rend_cache_clear(rend_cache *cache);

@@ -36,6 +36,10 @@ struct rend_loader {
     uint32_t *wanted;    /* [wanted_count], owned; next_wanted is the most urgent one left */
     uint32_t wanted_count, wanted_capacity, next_wanted;
     uint32_t *busy; /* [node count], owned */
+    /* Nodes taken since the last request: still busy, or a list made before they were would have
+     * them read again. */
+    uint32_t *taken; /* [node count], owned */
+    uint32_t taken_count;
     rend_paint paint;
     uint32_t paint_number;
     uint32_t reading;
@@ -166,7 +170,9 @@ bool rend_loader_create(const mospt_dataset *dataset, uint32_t thread_count, uin
     pthread_cond_init(&l->work, NULL);
     pthread_cond_init(&l->done, NULL);
     l->busy = calloc((size_t)dataset->hierarchy.count + 1, sizeof *l->busy);
-    bool ok = l->busy != NULL || mospt_err_nomem(err, dataset->hierarchy.count);
+    l->taken = calloc((size_t)dataset->hierarchy.count + 1, sizeof *l->taken);
+    bool ok =
+        (l->busy != NULL && l->taken != NULL) || mospt_err_nomem(err, dataset->hierarchy.count);
     if (thread_count > THREADS_MAX) thread_count = THREADS_MAX;
     while (ok && l->thread_count < thread_count) {
         ok = pthread_create(&l->threads[l->thread_count], NULL, work, l) == 0;
@@ -204,6 +210,7 @@ void rend_loader_destroy(rend_loader *loader)
     pthread_mutex_destroy(&loader->lock);
     free(loader->wanted);
     free(loader->busy);
+    free(loader->taken);
     free(loader);
 }
 
@@ -217,6 +224,8 @@ bool rend_loader_request(rend_loader *loader, const uint32_t *nodes, uint32_t co
         if (ok) loader->wanted = larger, loader->wanted_capacity = count;
     }
     if (ok) {
+        while (loader->taken_count > 0)
+            loader->busy[loader->taken[--loader->taken_count]] = 0;
         if (count > 0) memcpy(loader->wanted, nodes, count * sizeof *nodes);
         loader->wanted_count = count, loader->next_wanted = 0;
         pthread_cond_broadcast(&loader->work);
@@ -253,7 +262,7 @@ uint32_t rend_loader_take(rend_loader *loader, rend_loaded *out, uint32_t max)
         if (loader->first == NULL) loader->last = &loader->first;
         loader->finished_count--;
         loader->waiting_bytes -= f->size;
-        loader->busy[f->loaded.node] = 0;
+        loader->taken[loader->taken_count++] = f->loaded.node;
         out[count++] = f->loaded;
         free(f);
     }

@@ -1,6 +1,7 @@
 #include "render/stage.h"
 
 #include "render/cache.h"
+#include "render/match.h"
 #include "render/pages.h"
 
 #include <assert.h>
@@ -36,17 +37,23 @@ enum { LOOK_EVERY = 8, LOOKS_AT_REST = 6 };
 struct rend_stage {
     const mospt_dataset *dataset;
     rgl *gl;
-    rend_selector *selector;
+    rend_selector *selector, *ahead; /* ahead: for what will be seen shortly */
     rend_loader *loader;
+    rend_limits limits; /* as they were asked for */
+    rend_loader_wake *wake;
+    void *user;
     rend_cache *ram; /* values: owned vertices */
     rend_cache *gpu; /* values: owned rend_place; sizes: whole pages */
     rend_pages *pages;
     uint32_t page_count;
+    bool gpu_is_full;   /* an upload has failed for want of graphics memory */
     uint8_t *residency; /* [node count] on the GPU, owned */
 
     rend_scheme *scheme;
-    rend_look painted;     /* whose colours the loader and the RAM cache have */
-    char *attribute;       /* owned: the look's, whose owner may be gone */
+    rend_look painted; /* whose colours the loader and the RAM cache have */
+    char *attribute;   /* owned: the look's, whose owner may be gone */
+    rend_paint paint;
+    bool repaint; /* by another dataset: in the same colours, if they still mean the same */
     uint32_t paint_number; /* from 1; 0: nothing was painted yet */
     uint32_t *gpu_paint;   /* [node count], owned: number of the paint of what is on the GPU */
     rend_legend legend;
@@ -67,6 +74,8 @@ struct rend_stage {
     rend_frame frame;
     rend_clip clip; /* of the selection, if the view has one */
     rend_figures figures;
+    uint64_t loaded_before; /* by loaders of generations before */
+    double waited_before_s;
     rend_occlusion *occlusion;
 
     /* A picture in a window, drawn over several frames. */
@@ -95,25 +104,15 @@ static void evict_place(void *user, uint32_t node, void *value)
     s->residency[node] = REND_ABSENT;
 }
 
-static uint32_t pages_of(const rend_stage *s, uint32_t node)
+static uint32_t pages_in(const mospt_dataset *dataset, uint32_t node)
 {
-    return (uint32_t)(((uint64_t)s->dataset->hierarchy.nodes[node].count + PAGE_POINTS - 1) /
+    return (uint32_t)(((uint64_t)dataset->hierarchy.nodes[node].count + PAGE_POINTS - 1) /
                       PAGE_POINTS);
 }
 
-/* As many pages as the limit allows, as the dataset needs, and as the largest node needs at least.
- */
-static uint32_t count_pages(const rend_stage *s, uint64_t limit_bytes)
+static uint32_t pages_of(const rend_stage *s, uint32_t node)
 {
-    uint64_t all = 0, largest = 1, limit = limit_bytes / (PAGE_POINTS * sizeof(mospt_vertex));
-    for (uint32_t n = 0; n < s->dataset->hierarchy.count; n++) {
-        uint64_t pages = pages_of(s, n);
-        all += pages;
-        if (pages > largest) largest = pages;
-    }
-    if (limit > INT32_MAX / PAGE_POINTS) limit = INT32_MAX / PAGE_POINTS;
-    uint64_t count = all < limit ? all : limit;
-    return (uint32_t)(count > largest ? count : largest);
+    return pages_in(s->dataset, node);
 }
 
 static uint64_t or_default(uint64_t value, uint64_t otherwise)
@@ -121,39 +120,98 @@ static uint64_t or_default(uint64_t value, uint64_t otherwise)
     return value > 0 ? value : otherwise;
 }
 
-static uint64_t largest_node(const mospt_dataset *dataset)
+/* Pages of the largest node. */
+static uint32_t fewest_pages(const mospt_dataset *dataset)
 {
-    uint64_t largest = 0;
+    uint32_t largest = 1;
     for (uint32_t n = 0; n < dataset->hierarchy.count; n++)
-        if (dataset->hierarchy.nodes[n].count > largest)
-            largest = dataset->hierarchy.nodes[n].count;
-    return largest * sizeof(mospt_vertex);
+        if (pages_in(dataset, n) > largest) largest = pages_in(dataset, n);
+    return largest;
 }
 
-static bool make_caches(rend_stage *s, const rend_limits *limits, rend_loader_wake *wake,
-                        void *user, mospt_err *err)
+/* As many pages as the limit allows, as the dataset needs, and as the largest node needs at least.
+ * What is still being built will have more points, and half of a page more for each node. */
+static uint32_t count_pages(const rend_stage *s)
+{
+    const mospt_unfinished *u = &s->dataset->metadata.unfinished;
+    uint64_t limit = or_default(s->limits.gpu_cache_bytes, REND_GPU_CACHE_DEFAULT) /
+                     (PAGE_POINTS * sizeof(mospt_vertex));
+    uint64_t all = u->commit > 0 ? u->points / PAGE_POINTS * 5 / 4 : 0, now = 0;
+    uint32_t fewest = fewest_pages(s->dataset);
+    for (uint32_t n = 0; n < s->dataset->hierarchy.count; n++)
+        now += pages_of(s, n);
+    if (now > all) all = now;
+    if (limit > INT32_MAX / PAGE_POINTS) limit = INT32_MAX / PAGE_POINTS;
+    uint64_t count = all < limit ? all : limit;
+    return count > fewest ? (uint32_t)count : fewest;
+}
+
+static uint64_t ram_limit(const rend_stage *s, const mospt_dataset *dataset)
+{
+    uint64_t ram = or_default(s->limits.ram_cache_bytes, REND_RAM_CACHE_DEFAULT);
+    uint64_t largest = (uint64_t)fewest_pages(dataset) * PAGE_POINTS * sizeof(mospt_vertex);
+    return ram > largest ? ram : largest;
+}
+
+static uint64_t gpu_limit(const rend_stage *s)
+{
+    return (uint64_t)s->page_count * PAGE_POINTS * sizeof(mospt_vertex);
+}
+
+/* An arena of so many pages, or of half as many, and so on, as the graphics memory has room for. */
+static bool make_arena(rend_stage *s, uint32_t page_count, mospt_err *err)
+{
+    uint32_t fewest = fewest_pages(s->dataset);
+    mospt_err why = {0};
+    s->page_count = page_count;
+    while (!rgl_arena_create(s->gl, (uint64_t)s->page_count * PAGE_POINTS, &why)) {
+        if (why.code != MOSPT_ENOMEM || s->page_count == fewest) {
+            if (err != NULL) *err = why;
+            return false;
+        }
+        s->page_count = s->page_count / 2 > fewest ? s->page_count / 2 : fewest;
+        s->figures.gpu_halved++;
+    }
+    return true;
+}
+
+/* Makes the GPU cache, or makes it anew, with nothing in it. */
+static bool make_gpu(rend_stage *s, uint32_t page_count, mospt_err *err)
+{
+    rend_cache_destroy(s->gpu);
+    rend_pages_destroy(s->pages);
+    s->gpu = NULL, s->pages = NULL;
+    if (!make_arena(s, page_count, err)) return false;
+    s->pages = rend_pages_create(s->page_count);
+    s->gpu = rend_cache_create(s->dataset->hierarchy.count, gpu_limit(s), evict_place, s);
+    return (s->pages != NULL && s->gpu != NULL) || mospt_err_nomem(err, s->page_count);
+}
+
+static bool make_loader(rend_stage *s, mospt_err *err)
+{
+    uint64_t ram = ram_limit(s, s->dataset),
+             waiting = ram < WAITING_BYTES_MAX ? ram : WAITING_BYTES_MAX;
+    rend_loader_destroy(s->loader);
+    s->loader = NULL;
+    return rend_loader_create(s->dataset, LOADER_THREADS, waiting, s->wake, s->user, &s->loader,
+                              err);
+}
+
+static bool make_caches(rend_stage *s, mospt_err *err)
 {
     uint32_t nodes = s->dataset->hierarchy.count;
-    uint64_t ram = or_default(limits->ram_cache_bytes, REND_RAM_CACHE_DEFAULT);
-    if (ram < largest_node(s->dataset)) ram = largest_node(s->dataset);
-    s->page_count = count_pages(s, or_default(limits->gpu_cache_bytes, REND_GPU_CACHE_DEFAULT));
-    uint64_t gpu = (uint64_t)s->page_count * PAGE_POINTS * sizeof(mospt_vertex);
     s->residency = calloc((size_t)nodes + 1, 1);
     s->wanted = calloc((size_t)nodes + 1, sizeof *s->wanted);
     s->gpu_paint = calloc((size_t)nodes + 1, sizeof *s->gpu_paint);
     s->scheme = rend_scheme_create(s->dataset);
     s->selector = rend_select_create();
+    s->ahead = rend_select_create();
     s->occlusion = rend_occlusion_create();
-    s->pages = rend_pages_create(s->page_count);
-    s->ram = rend_cache_create(nodes, ram, evict_vertices, s);
-    s->gpu = rend_cache_create(nodes, gpu, evict_place, s);
+    s->ram = rend_cache_create(nodes, ram_limit(s, s->dataset), evict_vertices, s);
     if (s->residency == NULL || s->wanted == NULL || s->gpu_paint == NULL || s->scheme == NULL ||
-        s->selector == NULL || s->occlusion == NULL || s->pages == NULL || s->ram == NULL ||
-        s->gpu == NULL)
+        s->selector == NULL || s->ahead == NULL || s->occlusion == NULL || s->ram == NULL)
         return mospt_err_nomem(err, (size_t)nodes * 64);
-    if (!rgl_arena_create(s->gl, (uint64_t)s->page_count * PAGE_POINTS, err)) return false;
-    uint64_t waiting = ram < WAITING_BYTES_MAX ? ram : WAITING_BYTES_MAX;
-    return rend_loader_create(s->dataset, LOADER_THREADS, waiting, wake, user, &s->loader, err);
+    return make_gpu(s, count_pages(s), err) && make_loader(s, err);
 }
 
 bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits *limits,
@@ -161,9 +219,9 @@ bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits 
 {
     rend_stage *s = calloc(1, sizeof *s);
     if (s == NULL) return mospt_err_nomem(err, sizeof *s);
-    s->dataset = dataset, s->gl = gl;
+    s->dataset = dataset, s->gl = gl, s->limits = *limits, s->wake = wake, s->user = user;
     rend_frame_bounds(dataset, s->bounds_low, s->bounds_high);
-    if (!make_caches(s, limits, wake, user, err)) {
+    if (!make_caches(s, err)) {
         rend_stage_destroy(s);
         return false;
     }
@@ -179,6 +237,7 @@ void rend_stage_destroy(rend_stage *stage)
     rend_cache_destroy(stage->gpu);
     rend_pages_destroy(stage->pages);
     rend_select_destroy(stage->selector);
+    rend_select_destroy(stage->ahead);
     rend_occlusion_destroy(stage->occlusion);
     rend_scheme_destroy(stage->scheme);
     free(stage->attribute);
@@ -201,9 +260,13 @@ static bool upload_runs(rend_stage *s, uint32_t node, const rend_place *place,
     for (uint32_t r = 0; r < place->run_count; r++) {
         uint32_t part = place->runs[r].count * PAGE_POINTS;
         if (part > count - done) part = count - done;
+        mospt_err why = {0};
         if (!rgl_arena_upload(s->gl, (uint64_t)place->runs[r].first * PAGE_POINTS, vertices + done,
-                              part, err))
+                              part, &why)) {
+            s->gpu_is_full = why.code == MOSPT_ENOMEM;
+            if (err != NULL) *err = why;
             return false;
+        }
         done += part;
     }
     s->figures.uploaded_bytes += count * sizeof *vertices;
@@ -303,11 +366,23 @@ static void forget_damage(rend_stage *s)
     s->figures.damage = (mospt_err){0};
 }
 
+/* A node's level may have changed without a byte of it; all else that a paint looks at is its own.
+ */
+static bool is_same_paint(const rend_paint *a, const rend_paint *b)
+{
+    return a->source == b->source && a->source != REND_PAINT_LEVEL &&
+           a->source != REND_PAINT_DISTANCE && a->attribute == b->attribute &&
+           a->component == b->component && a->zero_is_none == b->zero_is_none &&
+           a->classes == b->classes && a->low == b->low && a->high == b->high &&
+           memcmp(&a->ramp, &b->ramp, sizeof a->ramp) == 0;
+}
+
 /* What is on the GPU stays there, to be drawn until it has been replaced. */
 static bool use_colours(rend_stage *s, const rend_look *look, mospt_err *err)
 {
     rend_paint paint;
-    if (s->paint_number > 0 && rend_scheme_same(look, &s->painted)) return true;
+    bool same = s->paint_number > 0 && rend_scheme_same(look, &s->painted);
+    if (same && !s->repaint) return true;
     char *attribute = look->attribute != NULL ? strdup(look->attribute) : NULL;
     if (look->attribute != NULL && attribute == NULL)
         return mospt_err_nomem(err, strlen(look->attribute));
@@ -315,8 +390,12 @@ static bool use_colours(rend_stage *s, const rend_look *look, mospt_err *err)
     free(s->attribute);
     s->painted = *look;
     s->painted.attribute = s->attribute = attribute;
-    s->paint_number++;
     rend_loader_set_paint(s->loader, &paint);
+    same = same && is_same_paint(&paint, &s->paint);
+    s->paint = paint;
+    s->repaint = false;
+    if (same) return true;
+    s->paint_number++;
     rend_cache_clear(s->ram);
     forget_damage(s);
     return true;
@@ -579,10 +658,39 @@ static bool fetch_requested(rend_stage *s, uint64_t most, uint32_t *wanted, uint
     return true;
 }
 
-/* Uploads what the RAM cache has, and asks the loader for the rest.
- * most     bytes to upload, but for the last node */
-static bool fetch(rend_stage *s, uint64_t most, rend_progress *progress, mospt_err *err)
+/* Asks for what will be missing, into the RAM cache and no further: on the GPU it might push out
+ * what is drawn. */
+static bool fetch_ahead(rend_stage *s, const rend_camera *camera, uint32_t *wanted, mospt_err *err)
 {
+    rend_frame frame;
+    const rend_selection *selection;
+    const rend_view_of *view = &s->hand.view;
+    rend_frame_make(camera, &s->dataset->metadata.grid, s->bounds_low, s->bounds_high, view->width,
+                    view->height, &frame);
+    const rend_select_input input = {.hierarchy = &s->dataset->hierarchy,
+                                     .grid = &s->dataset->metadata.grid,
+                                     .frame = &frame,
+                                     .residency = s->residency,
+                                     .budget_points = view->budget_points,
+                                     .min_node_px = view->min_node_px,
+                                     .clip = view->look.has_clip ? &s->clip : NULL};
+    if (!rend_select_run(s->ahead, &input, &selection, err)) return false;
+    uint64_t bytes = 0, most = rend_cache_limit(s->ram) / 4;
+    for (uint32_t i = 0; i < selection->request_count && bytes < most; i++) {
+        uint32_t node = selection->requests[i].node;
+        if (rend_cache_has(s->ram, node)) continue;
+        s->wanted[(*wanted)++] = node;
+        bytes += mospt_dataset_vertices_size(s->dataset, node);
+    }
+    s->figures.ahead = *wanted;
+    return true;
+}
+
+/* Uploads what the RAM cache has, and asks the loader for the rest. */
+static bool fetch(rend_stage *s, const rend_allowance *allowed, rend_progress *progress,
+                  mospt_err *err)
+{
+    uint64_t most = or_default(allowed->upload_bytes, UPLOAD_BYTES_PER_FRAME);
     uint64_t bytes = 0;
     uint32_t wanted = 0;
     *progress = REND_SETTLED;
@@ -591,6 +699,9 @@ static bool fetch(rend_stage *s, uint64_t most, rend_progress *progress, mospt_e
         !fetch_requested(s, most, &wanted, &bytes, progress, err))
         return false;
     if (*progress == REND_SETTLED && wanted > 0) *progress = REND_WAITING;
+    s->figures.ahead = 0;
+    if (wanted == 0 && allowed->ahead != NULL && !fetch_ahead(s, allowed->ahead, &wanted, err))
+        return false;
     return rend_loader_request(s->loader, s->wanted, wanted, err);
 }
 
@@ -681,20 +792,40 @@ static bool look_behind(rend_stage *s, rend_progress *progress, mospt_err *err)
     return learn_occlusion(s, err);
 }
 
+static bool draw_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
+                       rend_progress *progress, mospt_err *err)
+{
+    if (!use_colours(stage, &view->look, err)) return false;
+    take_loaded(stage);
+    bool goes_on = stage->hand.begun && memcmp(view, &stage->hand.view, sizeof *view) == 0;
+    if (!goes_on && !begin_picture(stage, view, err)) return false;
+    if (!draw_part(stage, allowed->points, err) || !fetch(stage, allowed, progress, err))
+        return false;
+    if (!stage->hand.begun) return look_behind(stage, progress, err);
+    *progress = REND_PART;
+    return true;
+}
+
+/* After an upload that failed: true if half of the GPU cache is left to try. */
+static bool halve_gpu(rend_stage *s, mospt_err *err)
+{
+    uint32_t fewest = fewest_pages(s->dataset);
+    uint32_t half = s->page_count / 2 > fewest ? s->page_count / 2 : fewest;
+    if (!s->gpu_is_full || half == s->page_count) return false;
+    s->gpu_is_full = false;
+    s->hand.begun = false;
+    s->figures.gpu_halved++;
+    unpin_all(s);
+    return make_gpu(s, half, err);
+}
+
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
                       rend_progress *progress, mospt_err *err)
 {
     static const rend_allowance unlimited = {0};
     if (allowed == NULL) allowed = &unlimited;
-    if (!use_colours(stage, &view->look, err)) return false;
-    take_loaded(stage);
-    bool goes_on = stage->hand.begun && memcmp(view, &stage->hand.view, sizeof *view) == 0;
-    if (!goes_on && !begin_picture(stage, view, err)) return false;
-    if (!draw_part(stage, allowed->points, err) ||
-        !fetch(stage, or_default(allowed->upload_bytes, UPLOAD_BYTES_PER_FRAME), progress, err))
-        return false;
-    if (!stage->hand.begun) return look_behind(stage, progress, err);
-    *progress = REND_PART;
+    while (!draw_frame(stage, view, allowed, progress, err))
+        if (!halve_gpu(stage, err)) return false;
     return true;
 }
 
@@ -820,7 +951,7 @@ static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *e
            learn_occlusion(s, err);
 }
 
-bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
+static bool draw_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
     stage->hand.begun = false;
     if (!use_colours(stage, &view->look, err)) return false;
@@ -839,13 +970,75 @@ bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *er
     return draw_all(stage, view, RGL_BEGIN | (blend ? RGL_AGAIN : 0), view->parts, RGL_END, err);
 }
 
+bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
+{
+    while (!draw_still(stage, view, err))
+        if (!halve_gpu(stage, err)) return false;
+    return true;
+}
+
+/* ---- another dataset ---- */
+
+/* Arrays by node, and what was on the GPU, under their new numbers. */
+static bool renumber(rend_stage *s, const uint32_t *to, const mospt_dataset *dataset,
+                     mospt_err *err)
+{
+    uint32_t before = s->dataset->hierarchy.count, nodes = dataset->hierarchy.count;
+    uint8_t *residency = calloc((size_t)nodes + 1, 1);
+    uint32_t *gpu_paint = calloc((size_t)nodes + 1, sizeof *gpu_paint);
+    uint32_t *wanted = calloc((size_t)nodes + 1, sizeof *wanted);
+    bool ok = (residency != NULL && gpu_paint != NULL && wanted != NULL) ||
+              mospt_err_nomem(err, (size_t)nodes * 9);
+    ok = ok && rend_cache_renumber(s->ram, to, nodes, ram_limit(s, dataset), err) &&
+         rend_cache_renumber(s->gpu, to, nodes, rend_cache_limit(s->gpu), err);
+    if (!ok) {
+        free(residency), free(gpu_paint), free(wanted);
+        return false;
+    }
+    for (uint32_t n = 0; n < before; n++) {
+        if (to[n] == MOSPT_NO_NODE || s->residency[n] != REND_RESIDENT) continue;
+        residency[to[n]] = REND_RESIDENT;
+        gpu_paint[to[n]] = s->gpu_paint[n];
+    }
+    free(s->residency), free(s->gpu_paint), free(s->wanted);
+    s->residency = residency, s->gpu_paint = gpu_paint, s->wanted = wanted;
+    s->dataset = dataset;
+    return true;
+}
+
+bool rend_stage_swap(rend_stage *stage, const mospt_dataset *dataset, mospt_err *err)
+{
+    rend_stage *s = stage;
+    uint32_t *to = calloc((size_t)s->dataset->hierarchy.count + 1, sizeof *to);
+    rend_scheme *scheme = rend_scheme_create(dataset);
+    bool ok = (to != NULL && scheme != NULL) || mospt_err_nomem(err, 0);
+    s->hand.begun = false;
+    unpin_all(s);
+    s->loaded_before += rend_loader_bytes(s->loader);
+    s->waited_before_s += rend_loader_waited_s(s->loader);
+    rend_loader_destroy(s->loader); /* it reads the dataset of before */
+    s->loader = NULL;
+    if (ok) rend_match_nodes(s->dataset, dataset, to);
+    ok = ok && renumber(s, to, dataset, err);
+    free(to);
+    if (!ok) return rend_scheme_destroy(scheme), false;
+    rend_scheme_destroy(s->scheme);
+    s->scheme = scheme;
+    s->repaint = true;
+    forget_damage(s);
+    rend_frame_bounds(dataset, s->bounds_low, s->bounds_high);
+    bool fits = s->page_count >= fewest_pages(s->dataset) &&
+                (s->figures.gpu_halved > 0 || s->page_count >= count_pages(s));
+    return make_loader(s, err) && (fits || make_gpu(s, count_pages(s), err));
+}
+
 void rend_stage_figures(rend_stage *stage, rend_figures *out)
 {
     rend_figures *f = &stage->figures;
     f->ram_used = rend_cache_used(stage->ram), f->ram_limit = rend_cache_limit(stage->ram);
     f->gpu_used = rend_cache_used(stage->gpu), f->gpu_limit = rend_cache_limit(stage->gpu);
-    f->loaded_bytes = rend_loader_bytes(stage->loader);
-    f->waited_s = rend_loader_waited_s(stage->loader);
+    f->loaded_bytes = stage->loaded_before + rend_loader_bytes(stage->loader);
+    f->waited_s = stage->waited_before_s + rend_loader_waited_s(stage->loader);
     *out = *f;
 }
 

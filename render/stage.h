@@ -36,11 +36,13 @@ typedef struct {
     uint64_t points_hidden; /* what would have been drawn of these, without what is below */
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
+    uint32_t gpu_halved;                               /* times, for want of graphics memory */
     uint64_t loaded_bytes;                             /* since the start */
     uint64_t uploaded_bytes;                           /* since the start */
     uint64_t points_total;                             /* drawn since the start, part by part */
     double waited_s;  /* for the loader, by rend_stage_still(), since the start */
     uint32_t pending; /* nodes that this view still misses */
+    uint32_t ahead;   /* nodes that are read because they will be seen shortly */
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage; /* of the first damaged node; code MOSPT_OK without any */
@@ -48,17 +50,26 @@ typedef struct {
 
 /* dataset  borrowed
  * gl       borrowed
- * limits   cache sizes; smaller than the largest node, they are raised to that
+ * limits   cache sizes; smaller than the largest node, they are raised to that. Where the graphics
+ *          memory has less room, now or later, the GPU cache is halved until it fits
  * wake     from a loader thread, when a frame would now show more; NULL: nobody needs to know
  * errors   MOSPT_ENOMEM, MOSPT_EIO */
 bool rend_stage_create(const mospt_dataset *dataset, rgl *gl, const rend_limits *limits,
                        rend_loader_wake *wake, void *user, rend_stage **out, mospt_err *err);
 void rend_stage_destroy(rend_stage *stage);
 
+/* Goes on with another generation of the dataset; what is the same in both stays where it is.
+ * dataset  borrowed; the one before may be closed afterwards
+ * errors   MOSPT_ENOMEM, MOSPT_EIO: the stage is good for nothing but rend_stage_destroy() */
+bool rend_stage_swap(rend_stage *stage, const mospt_dataset *dataset, mospt_err *err);
+
 /* What a frame in a window may cost. */
 typedef struct {
     uint64_t points;       /* drawn; a picture of more is drawn over several frames; 0: no limit */
     uint64_t upload_bytes; /* a node more at most; 0: 64 MiB */
+    /* Where the camera will be shortly: when the frame itself misses nothing, what is missing there
+     * is read into memory. NULL: nobody knows. */
+    const rend_camera *ahead;
 } rend_allowance;
 
 typedef enum {

@@ -10,6 +10,7 @@
 #include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
+#include "render/watch.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -22,6 +23,8 @@ enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
 #define STOP_ASKED_S 0.25       /* between two looks at whether to stop */
 #define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
+#define WATCH_S 1.0             /* between two looks at whether the dataset has changed */
+#define AHEAD_S 0.5             /* how far the camera's motion is thought on */
 #define TRAVEL_S 1.0            /* one that moved for longer is somewhere else */
 #define FULLER 4                /* how many times as many points the next picture at rest has */
 #define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
@@ -34,6 +37,10 @@ enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 
 typedef struct {
     const mospt_dataset *dataset;
+    mospt_dataset *newer; /* owned; NULL: the dataset is the one that was given */
+    rend_watch watch;
+    double watched_at;
+    uint32_t gpu_halved;
     const rend_view_options *options;
     rgl_window *window;
     rend_engine engine;
@@ -57,6 +64,8 @@ typedef struct {
     double flown_at;   /* seconds; 0: not flying */
     double moved_at;   /* seconds; 0: the camera rests */
     double set_out_at; /* seconds: since when it has moved */
+    rend_camera drawn; /* in the frame before, while the camera moved */
+    double drawn_at;   /* 0: it rested */
     rend_pace pace;
     uint64_t rest_points; /* budget of the pictures at rest, which grows with each; 0: not begun */
     double frame_ms, notice_until;
@@ -455,6 +464,21 @@ static bool grow_rest_budget(viewer *v)
     return true;
 }
 
+/* Where the camera will be if it moves on as it does; false while it rests. */
+static bool think_ahead(viewer *v, bool moves, rend_camera *ahead)
+{
+    double now = rgl_window_seconds(), elapsed = now - v->drawn_at;
+    bool known = moves && v->drawn_at > 0 && elapsed > 0 && elapsed < AHEAD_S;
+    *ahead = v->view.camera;
+    for (int a = 0; known && a < 3; a++) {
+        ahead->eye[a] += (ahead->eye[a] - v->drawn.eye[a]) * AHEAD_S / elapsed;
+        ahead->target[a] += (ahead->target[a] - v->drawn.target[a]) * AHEAD_S / elapsed;
+    }
+    v->drawn = v->view.camera;
+    v->drawn_at = moves ? now : 0;
+    return known;
+}
+
 /* While the camera moves, a frame is as much as fits into its time. At rest it draws so much of a
  * picture that may be larger. The last one before the window closes is whole. */
 static bool draw_points(viewer *v, bool last, mospt_err *err)
@@ -463,6 +487,8 @@ static bool draw_points(viewer *v, bool last, mospt_err *err)
     rend_view_of view = v->view;
     rend_allowance allowed = {.points = fits, .upload_bytes = rend_pace_bytes(&v->pace)};
     bool moves = v->moved_at > 0 && !last;
+    rend_camera ahead;
+    if (think_ahead(v, moves, &ahead)) allowed.ahead = &ahead;
     if (moves && view.budget_points > fits) view.budget_points = fits;
     if (!moves && !last) view.budget_points = rest_budget(v);
     if (moves || last) allowed.points = 0;
@@ -551,19 +577,88 @@ static void come_to_rest(viewer *v)
     v->dirty = true;
 }
 
+/* ---- a dataset that changes ---- */
+
+static void tell_growth(viewer *v, uint64_t points_before)
+{
+    char points[16], text[64];
+    const mospt_metadata *m = &v->dataset->metadata;
+    rend_hud_count(m->point_count, points);
+    if (m->unfinished.commit > 0)
+        snprintf(text, sizeof text, "being built: %s points so far", points);
+    else if (m->point_count == points_before)
+        snprintf(text, sizeof text, "the dataset is finished");
+    else snprintf(text, sizeof text, "the dataset has %s points now", points);
+    tell(v, text);
+}
+
+/* Goes on with what the dataset has become; what cannot be opened is left alone. */
+static bool take_newer(viewer *v, mospt_err *err)
+{
+    mospt_dataset *newer = NULL;
+    mospt_err why = {0};
+    if (!mospt_dataset_open(v->dataset->path, &newer, &why)) {
+        tell(v, why.message);
+        return true;
+    }
+    if (rend_watch_is_same(v->dataset, newer)) return mospt_dataset_close(newer), true;
+    uint64_t points = v->dataset->metadata.point_count;
+    bool ok = rend_stage_swap(v->stage, newer, err);
+    mospt_dataset_close(v->newer);
+    v->dataset = v->newer = newer;
+    v->choice_count = rend_choice_list(&newer->metadata, v->choices);
+    if (!rend_scheme_fits(newer, &v->view.look, NULL)) v->view.look.colour = REND_COLOUR_RGB;
+    v->result.swaps++;
+    ok = ok &&
+         rend_camera_make(&v->options->camera, newer, v->view.width, v->view.height, &v->home, err);
+    tell_growth(v, points);
+    return ok;
+}
+
+static bool watch(viewer *v, mospt_err *err)
+{
+    double now = rgl_window_seconds();
+    if (now < v->watched_at + WATCH_S) return true;
+    v->watched_at = now;
+    switch (rend_watch_look(&v->watch)) {
+    case REND_WATCH_CHANGED:
+        return take_newer(v, err);
+    case REND_WATCH_GONE:
+        tell(v, "the dataset was deleted; it can be seen until this window is closed");
+        return true;
+    default:
+        return true;
+    }
+}
+
+/* What went wrong on the way and was got over. */
+static void tell_faults(viewer *v)
+{
+    rend_figures figures;
+    char text[80];
+    rend_stage_figures(v->stage, &figures);
+    if (figures.gpu_halved == v->gpu_halved) return;
+    v->gpu_halved = figures.gpu_halved;
+    snprintf(text, sizeof text, "graphics memory is short: nodes get %llu MB of it now",
+             (unsigned long long)(figures.gpu_limit / 1000000));
+    tell(v, text);
+}
+
 static bool run(viewer *v, mospt_err *err)
 {
     while (!v->quit) {
         rgl_event event;
         double seconds = rest(v);
-        if (v->options->should_stop != NULL && (seconds < 0 || seconds > STOP_ASKED_S))
-            seconds = STOP_ASKED_S;
+        double longest = v->options->should_stop != NULL ? STOP_ASKED_S : WATCH_S;
+        if (seconds < 0 || seconds > longest) seconds = longest;
         rgl_window_wait(v->window, seconds);
         if (v->options->should_stop != NULL && v->options->should_stop()) v->quit = true;
         while (rgl_window_next(v->window, &event))
             handle(v, &event);
         fly(v);
         play(v);
+        if (!watch(v, err)) return false;
+        tell_faults(v);
         come_to_rest(v);
         if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
             v->notice[0] = '\0', v->dirty = true;
@@ -593,6 +688,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
     v->help = o->help;
     v->dirty = true;
     if (!rend_strip_init(o->path, &v->strip, err)) return false;
+    if (!rend_watch_init(&v->watch, v->dataset->path, err)) return false;
     if (!rend_camera_make(&o->camera, v->dataset, v->view.width, v->view.height, &v->home, err))
         return false;
     v->view.camera = v->home;
@@ -619,6 +715,8 @@ bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
     rend_strip_fini(&v.strip);
     rgl_text_destroy(v.text);
     rend_stage_destroy(v.stage);
+    mospt_dataset_close(v.newer);
+    rend_watch_fini(&v.watch);
     rend_engine_close(&v.engine);
     rgl_window_destroy(v.window);
     return ok;

@@ -21,6 +21,7 @@ typedef struct {
 typedef struct {
     uint64_t frames;
     double slowest_ms, mean_ms;
+    uint32_t swaps; /* times that the dataset became another one, and the window went on with it */
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage;   /* of the first of them */
@@ -29,11 +30,13 @@ typedef struct {
 
 enum { REND_FPS_DEFAULT = 30 };
 
-/* Shows the dataset until the user has seen enough. While the camera moves, a machine that cannot
- * draw the budget so many times a second draws as much of it as it can. When the camera rests,
- * pictures of more and more points follow, each drawn over as many frames as it takes while the one
- * before stays on the screen, up to the budget. When nothing changes and nothing is loading,
- * nothing is drawn. result   NULL: not wanted errors   MOSPT_EINVAL (options; no display),
- * MOSPT_EIO (the driver was lost), MOSPT_ENOMEM threads  the main one */
+/* A dataset that is being built, or is built again, is looked at once a second, and the window goes
+ * on with what it has become; one that was deleted can be seen to the end. Shows the dataset until
+ * the user has seen enough. While the camera moves, a machine that cannot draw the budget so many
+ * times a second draws as much of it as it can. When the camera rests, pictures of more and more
+ * points follow, each drawn over as many frames as it takes while the one before stays on the
+ * screen, up to the budget. When nothing changes and nothing is loading, nothing is drawn. result
+ * NULL: not wanted errors   MOSPT_EINVAL (options; no display), MOSPT_EIO (the driver was lost),
+ * MOSPT_ENOMEM threads  the main one */
 bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
                rend_view_result *result, mospt_err *err);

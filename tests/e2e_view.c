@@ -1,4 +1,5 @@
 /* A window, run where there is a display (CI: Xvfb). */
+#include "render/gl/window.h"
 #include "render/view.h"
 #include "tests/render_tools.h"
 
@@ -31,6 +32,67 @@ static void a_window_shows_the_dataset_and_a_line_of_figures(void **unused)
     render_site_fini(&site);
 }
 
+/* What happens to the dataset behind the window, as it asks whether to stop: replaced, then
+ * deleted. */
+static struct {
+    const char *path, *next;
+    double start;
+    uint32_t step;
+} behind;
+
+static void move_aside(void)
+{
+    char *aside = core_path(behind.path, "../aside%u", behind.step++);
+    assert_int_equal(rename(behind.path, aside), 0);
+    free(aside);
+}
+
+static bool change_behind(void)
+{
+    double now = rgl_window_seconds();
+    if (behind.step == 0) behind.start = now, behind.step = 1;
+    if (behind.step == 1 && now > behind.start + 1.2) {
+        move_aside();
+        assert_int_equal(rename(behind.next, behind.path), 0);
+    }
+    if (behind.step == 2 && now > behind.start + 3) move_aside();
+    return now > behind.start + 4.5;
+}
+
+static void a_window_goes_on_with_what_its_dataset_becomes(void **unused)
+{
+    (void)unused;
+    render_site few, more;
+    rend_view_result result;
+    mospt_err err = {0};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &few);
+    render_more_make(30000, &more);
+    const rend_view_options options = {.width = 640, .height = 400, .should_stop = change_behind};
+    behind.path = few.path, behind.next = more.path;
+    CORE_NEED(rend_view(few.dataset, &options, &result, &err));
+    assert_int_equal(behind.step, 3);
+    assert_int_equal(result.swaps, 1);
+    assert_int_equal(result.damaged_nodes, 0);
+    render_site_fini(&few);
+    render_site_fini(&more);
+}
+
+static void damage_is_counted_and_the_rest_is_shown(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_view_result result;
+    mospt_err err = {0};
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    render_site_damage(&site, 1);
+    const rend_view_options options = {.frames = 30, .width = 640, .height = 400};
+    CORE_NEED(rend_view(site.dataset, &options, &result, &err));
+    assert_int_equal(result.frames, 30);
+    assert_int_equal(result.damaged_nodes, 1);
+    assert_int_equal(result.damage.code, MOSPT_EFORMAT);
+    render_site_fini(&site);
+}
+
 static void without_a_display_one_sentence_says_so(void **unused)
 {
     (void)unused;
@@ -48,6 +110,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_window_shows_the_dataset_and_a_line_of_figures),
+        cmocka_unit_test(a_window_goes_on_with_what_its_dataset_becomes),
+        cmocka_unit_test(damage_is_counted_and_the_rest_is_shown),
         cmocka_unit_test(without_a_display_one_sentence_says_so),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -99,6 +99,20 @@ void render_site_make(core_kind kind, uint32_t count, const int64_t shift[3], re
     build(out, count);
 }
 
+void render_more_make(uint32_t count, render_site *out)
+{
+    *out = (render_site){0};
+    core_site_make(CORE_CLUSTERED, 16, 2 * count, 7, &out->site);
+    for (uint32_t i = count; i < 2 * count; i++) {
+        uint32_t x;
+        uint8_t *record = out->site.records + i * out->site.stride;
+        memcpy(&x, record, sizeof x);
+        x |= UINT32_C(1) << 15;
+        memcpy(record, &x, sizeof x);
+    }
+    build(out, 2 * count);
+}
+
 void render_rooms_make(uint32_t count, render_site *out)
 {
     enum { ROOM = 1 << 13 };

@@ -29,6 +29,9 @@ typedef struct {
 void render_site_make(core_kind kind, uint32_t count, const int64_t shift[3], render_site *out);
 /* Walls that make 8 x 8 closed rooms, 65.536 m all together, each as high as wide. */
 void render_rooms_make(uint32_t count, render_site *out);
+/* The first `count` points of render_site_make(CORE_CLUSTERED, count, ...), and as many again in
+ * the upper half of x: below it, nodes stay as they were. */
+void render_more_make(uint32_t count, render_site *out);
 void render_site_fini(render_site *site);
 
 /* Changes one byte of the first vertex of a node on disk. */

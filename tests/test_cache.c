@@ -151,12 +151,42 @@ static void a_pinned_entry_stays(void **unused)
     rend_cache_destroy(c);
 }
 
+static void count_eviction(void *user, uint32_t node, void *value)
+{
+    (void)node, (void)value;
+    ++*(uint32_t *)user;
+}
+
+static void other_numbers_keep_the_order_of_use(void **unused)
+{
+    (void)unused;
+    uint32_t evicted = 0, to[10];
+    mospt_err err = {0};
+    rend_cache *c = rend_cache_create(10, 1000, count_eviction, &evicted);
+    for (uint32_t n = 0; n < 10; n++) {
+        assert_true(rend_cache_put(c, n, 100, (void *)(uintptr_t)(n + 1)));
+        to[n] = n % 2 ? 19 - n : UINT32_MAX;
+    }
+    rend_cache_use(c, 1); /* the newest now; the oldest with a number is 3 */
+    CORE_NEED(rend_cache_renumber(c, to, 20, 400, &err));
+    assert_int_equal(evicted, 6); /* five without a number, and one that does not fit */
+    assert_false(rend_cache_has(c, 16));
+    assert_int_equal(rend_cache_used(c), 400);
+    assert_int_equal((uintptr_t)rend_cache_use(c, 18), 2);
+    assert_int_equal((uintptr_t)rend_cache_use(c, 14), 6);
+    assert_true(rend_cache_put(c, 0, 100, NULL)); /* evicts the oldest: 7, now 12 */
+    assert_false(rend_cache_has(c, 12));
+    rend_cache_destroy(c);
+    assert_int_equal(evicted, 11);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_twin_agrees),
         cmocka_unit_test(an_entry_larger_than_the_cache_is_refused),
         cmocka_unit_test(a_pinned_entry_stays),
+        cmocka_unit_test(other_numbers_keep_the_order_of_use),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

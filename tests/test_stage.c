@@ -433,6 +433,132 @@ static void what_was_hidden_comes_back_when_the_wall_is_gone(void **unused)
     render_site_fini(&site);
 }
 
+static void another_generation_takes_over_what_is_the_same(void **unused)
+{
+    (void)unused;
+    render_site few, more;
+    mospt_err err = {0};
+    const rend_limits limits[] = {{0}, {.ram_cache_bytes = 1, .gpu_cache_bytes = 200000}};
+    const rend_colour colours[] = {REND_COLOUR_RGB, REND_COLOUR_ELEVATION, REND_COLOUR_DENSITY};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &few);
+    render_more_make(30000, &more);
+    for (int l = 0; l < 2; l++)
+        for (int c = 0; c < 3; c++) {
+            scene s, fresh;
+            rend_progress progress;
+            const rend_allowance allowed = {.points = 3000};
+            start(&few, &limits[l], &s);
+            start(&more, &limits[l], &fresh);
+            s.view.look.colour = fresh.view.look.colour = colours[c];
+            fresh.view.camera = s.view.camera;
+            converge(&s);
+            part_of(&s, &allowed, &progress); /* in the middle of a picture */
+            rend_figures before, after, all;
+            rend_stage_figures(s.stage, &before);
+            CORE_NEED(rend_stage_swap(s.stage, more.dataset, &err));
+            converge(&s);
+            converge(&fresh);
+            assert_true(rgl_null_record(s.gl).picture_hash ==
+                        rgl_null_record(fresh.gl).picture_hash);
+            rend_stage_figures(s.stage, &after);
+            rend_stage_figures(fresh.stage, &all);
+            bool keeps = l == 0 && c == 0; /* colours that stay, and room */
+            uint64_t again = after.loaded_bytes - before.loaded_bytes;
+            if (keeps)
+                print_message("AGAIN %lu of %lu, few %lu; ram %lu\n", again, all.loaded_bytes,
+                              before.loaded_bytes, before.ram_used);
+            if (keeps) assert_true(again > 0 && again < all.loaded_bytes * 9 / 10);
+            before = after;
+            CORE_NEED(rend_stage_swap(s.stage, few.dataset, &err));
+            converge(&s);
+            rend_stage_figures(s.stage, &after);
+            again = after.uploaded_bytes - before.uploaded_bytes;
+            if (keeps) assert_true(again > 0 && again < all.uploaded_bytes * 9 / 10);
+            stop(&s);
+            stop(&fresh);
+        }
+    render_site_fini(&few);
+    render_site_fini(&more);
+}
+
+static void graphics_memory_that_is_short_is_used_as_far_as_it_goes(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    rend_figures figures;
+    mospt_err err = {0};
+    const rend_limits limits = {0};
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    rgl_record whole = still(&site, 0, 0, &figures);
+    uint64_t all = figures.gpu_limit / 16;
+    start(&site, &limits, &s);
+    converge(&s);
+    for (uint64_t room = all / 2; room > all / 20; room /= 2) { /* less and less of it */
+        rgl_null_set_room(s.gl, room);
+        s.view.camera.target[0] += 1; /* something to upload */
+        s.view.look.colour =
+            s.view.look.colour == REND_COLOUR_RGB ? REND_COLOUR_SCAN : REND_COLOUR_RGB;
+        converge(&s);
+        rend_stage_figures(s.stage, &figures);
+        assert_true(figures.gpu_limit <= 16 * room && figures.gpu_halved > 0);
+        assert_true(figures.points_drawn > 0);
+    }
+    stop(&s);
+    start(&site, &limits, &s);
+    rgl_null_set_room(s.gl, all / 4);
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    assert_true(rgl_null_record(s.gl).picture_hash == whole.picture_hash);
+    stop(&s);
+    /* At least one node must fit. */
+    CORE_NEED(rgl_null_create(&s.gl, &err));
+    rgl_null_set_room(s.gl, 1);
+    CORE_FAILS(rend_stage_create(site.dataset, s.gl, &limits, NULL, NULL, &s.stage, &err),
+               MOSPT_ENOMEM);
+    rgl_destroy(s.gl);
+    render_site_fini(&site);
+}
+
+/* A frame that misses nothing has read what the next place misses, and nothing of it was uploaded.
+ */
+static void what_will_be_seen_is_read_ahead(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    rend_progress progress;
+    rend_figures figures;
+    const rend_limits limits = {0};
+    uint64_t state = 5;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    s.view.budget_points = 3000;
+    s.view.camera = render_camera_random(&site.dataset->metadata.grid, &state);
+    converge(&s);
+    rend_camera elsewhere = {0};
+    rend_allowance allowed = {.ahead = &elsewhere};
+    do { /* somewhere where something is missing */
+        elsewhere = render_camera_random(&site.dataset->metadata.grid, &state);
+        part_of(&s, &allowed, &progress);
+        rend_stage_figures(s.stage, &figures);
+    } while (figures.ahead == 0);
+    uint64_t uploaded = figures.uploaded_bytes, loaded;
+    do { /* until all of it is there */
+        sched_yield();
+        part_of(&s, &allowed, &progress);
+        rend_stage_figures(s.stage, &figures);
+    } while (figures.ahead > 0);
+    assert_int_equal(figures.uploaded_bytes, uploaded);
+    loaded = figures.loaded_bytes;
+    s.view.camera = elsewhere;
+    part_of(&s, NULL, &progress);
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.loaded_bytes, loaded);
+    assert_true(figures.uploaded_bytes > uploaded);
+    stop(&s);
+    render_site_fini(&site);
+}
+
 static const rend_look LOOKS[] = {
     {.colour = REND_COLOUR_RGB},
     {.colour = REND_COLOUR_SCAN},
@@ -580,6 +706,9 @@ int main(void)
         cmocka_unit_test(another_view_begins_another_picture),
         cmocka_unit_test(uploads_of_a_frame_keep_to_what_is_allowed),
         cmocka_unit_test(what_was_hidden_comes_back_when_the_wall_is_gone),
+        cmocka_unit_test(another_generation_takes_over_what_is_the_same),
+        cmocka_unit_test(graphics_memory_that_is_short_is_used_as_far_as_it_goes),
+        cmocka_unit_test(what_will_be_seen_is_read_ahead),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@ typedef struct {
     rgl base;
     mospt_vertex *arena; /* [size], owned */
     uint64_t size;
+    uint64_t room;
     float depth; /* of every pixel of a scene */
     uint64_t pixels;
     rgl_record record;
@@ -27,9 +28,16 @@ static const char *null_renderer(const rgl *gl)
     return "null";
 }
 
+static bool has_room(const null_rgl *n, uint64_t vertices, mospt_err *err)
+{
+    return vertices <= n->room ||
+           mospt_err_set(err, MOSPT_ENOMEM, mospt_nowhere(), "the null backend is full");
+}
+
 static bool null_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     null_rgl *n = (null_rgl *)gl;
+    if (!has_room(n, vertex_count, err)) return false;
     mospt_vertex *arena = calloc(vertex_count + 1, sizeof *arena);
     if (arena == NULL) return mospt_err_nomem(err, vertex_count * sizeof *arena);
     free(n->arena);
@@ -40,8 +48,8 @@ static bool null_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 static bool null_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertices, uint32_t count,
                               mospt_err *err)
 {
-    (void)err;
     null_rgl *n = (null_rgl *)gl;
+    if (!has_room(n, n->size, err)) return false;
     if (first > n->size || count > n->size - first) return n->record.overruns++, true;
     memcpy(n->arena + first, vertices, count * sizeof *vertices);
     n->record.points_uploaded += count;
@@ -161,6 +169,7 @@ bool rgl_null_create(rgl **out, mospt_err *err)
     if (n == NULL) return mospt_err_nomem(err, sizeof *n);
     n->base.driver = &NULL_DRIVER;
     n->depth = 1;
+    n->room = UINT64_MAX;
     *out = &n->base;
     return true;
 }
@@ -173,4 +182,9 @@ rgl_record rgl_null_record(const rgl *gl)
 void rgl_null_set_depth(rgl *gl, float depth)
 {
     ((null_rgl *)gl)->depth = depth;
+}
+
+void rgl_null_set_room(rgl *gl, uint64_t vertices)
+{
+    ((null_rgl *)gl)->room = vertices;
 }

@@ -170,3 +170,7 @@ rgl_record rgl_null_record(const rgl *gl);
 
 /* What the null backend says of every pixel's depth from now on; 1 at first: nothing there. */
 void rgl_null_set_depth(rgl *gl, float depth);
+
+/* Graphics memory of the null backend, vertices: a larger arena is refused, and so are uploads into
+ * one that is there. */
+void rgl_null_set_room(rgl *gl, uint64_t vertices);
