@@ -310,13 +310,18 @@ static void the_background_goes_from_top_to_bottom(void **unused)
     memcpy(s.scene.background_top, top, sizeof top);
     memcpy(s.scene.background_bottom, bottom, sizeof bottom);
     add(&s, 30, 30, 16, 0, RED);
-    draw(&s);
-    for (int row = 0; row < SIDE; row++) {
-        int up = (int)(255 * (row + 0.5) / SIDE + 0.5);
-        const uint8_t *p = at(&s, 5, row);
-        assert_true(abs(p[0] - up) <= 1 && abs(p[1] - (255 - up)) <= 1 && abs(p[2] - 128) <= 1);
+    for (int way = 0; way < 8; way++) { /* in place, or through any of the passes */
+        s.scene.edl_strength = way & 1 ? 24 : 0, s.scene.edl_radius_px = 1;
+        s.scene.fill_px = way & 2 ? 1 : 0;
+        s.scene.blend_slab = way & 4 ? 0.01f : 0;
+        draw(&s);
+        for (int row = 0; row < SIDE; row++) {
+            int up = (int)(255 * (row + 0.5) / SIDE + 0.5);
+            const uint8_t *p = at(&s, 5, row);
+            assert_true(abs(p[0] - up) <= 1 && abs(p[1] - (255 - up)) <= 1 && abs(p[2] - 128) <= 1);
+        }
+        assert_true(is(at(&s, 30, 30), RED));
     }
-    assert_true(is(at(&s, 30, 30), RED));
     teardown(&s);
 }
 

@@ -32,8 +32,8 @@ void rgl_canvas_fini(rgl_canvas *canvas)
     delete_layers(canvas);
     glDeleteProgram(canvas->resolve);
     glDeleteProgram(canvas->fill);
-    glDeleteProgram(canvas->light);
-    glDeleteProgram(canvas->plain);
+    glDeleteProgram(canvas->shade);
+    glDeleteProgram(canvas->background);
     glDeleteVertexArrays(1, &canvas->nothing);
 }
 
@@ -49,6 +49,8 @@ static GLuint make_texture(const rgl_canvas *c, GLint format, GLenum layout, GLe
                  NULL);
     GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
     GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE));
     return texture;
 }
 
@@ -181,10 +183,10 @@ bool rgl_canvas_add(rgl_canvas *canvas, mospt_err *err)
 
 /* ---- passes over the screen ---- */
 
-static bool use_program(GLuint *program, const char *defines, const char *fragment, mospt_err *err)
+static bool use_program(GLuint *program, const char *fragment, mospt_err *err)
 {
     static const char *const units[] = {"colours", "depths", "nearest"};
-    if (*program == 0 && !rgl_program_create(defines, RGL_SCREEN_VERTEX, fragment, program, err))
+    if (*program == 0 && !rgl_program_create("", RGL_SCREEN_VERTEX, fragment, program, err))
         return false;
     GL(glUseProgram(*program));
     for (int u = 0; u < 3; u++)
@@ -226,7 +228,7 @@ static GLint uniform(GLuint program, const char *name)
 static bool resolve(rgl_canvas *c, const rgl_scene *scene, mospt_err *err)
 {
     if (!make_plain_layer(c, &c->resolved, err) ||
-        !use_program(&c->resolve, "", RGL_RESOLVE_FRAGMENT, err))
+        !use_program(&c->resolve, RGL_RESOLVE_FRAGMENT, err))
         return false;
     GL(glActiveTexture(GL_TEXTURE0 + RGL_CANVAS_NEAREST));
     GL(glBindTexture(GL_TEXTURE_2D, c->nearest.depths));
@@ -237,7 +239,7 @@ static bool resolve(rgl_canvas *c, const rgl_scene *scene, mospt_err *err)
 
 static bool fill(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, mospt_err *err)
 {
-    if (!make_plain_layer(c, &c->filled, err) || !use_program(&c->fill, "", RGL_FILL_FRAGMENT, err))
+    if (!make_plain_layer(c, &c->filled, err) || !use_program(&c->fill, RGL_FILL_FRAGMENT, err))
         return false;
     uint32_t radius = scene->fill_px < RGL_FILL_PX_MAX ? scene->fill_px : RGL_FILL_PX_MAX;
     GL(glUniform1i(uniform(c->fill, "radius"), (GLint)radius));
@@ -247,24 +249,56 @@ static bool fill(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, m
     return true;
 }
 
+static void set_background(GLuint program, const rgl_scene *scene)
+{
+    GL(glUniform3fv(uniform(program, "top"), 1, scene->background_top));
+    GL(glUniform3fv(uniform(program, "bottom"), 1, scene->background_bottom));
+    GL(glUniform1f(uniform(program, "height"), (float)scene->frame.height));
+}
+
 static bool shade(rgl_canvas *c, const rgl_scene *scene, const rgl_layer *from, GLuint to,
                   mospt_err *err)
 {
-    bool edl = scene->edl_strength > 0;
-    GLuint *program = edl ? &c->light : &c->plain;
-    if (!use_program(program, edl ? "#define EDL\n" : "", RGL_SHADE_FRAGMENT, err)) return false;
-    GL(glUniform1f(uniform(*program, "span"), span_of(scene)));
-    GL(glUniform2f(uniform(*program, "edl"), scene->edl_strength, scene->edl_radius_px));
-    GL(glUniform3fv(uniform(*program, "top"), 1, scene->background_top));
-    GL(glUniform3fv(uniform(*program, "bottom"), 1, scene->background_bottom));
-    GL(glUniform1f(uniform(*program, "height"), (float)c->height));
+    if (!use_program(&c->shade, RGL_SHADE_FRAGMENT, err)) return false;
+    GL(glUniform1f(uniform(c->shade, "span"), span_of(scene)));
+    GL(glUniform2f(uniform(c->shade, "edl"), scene->edl_strength, scene->edl_radius_px));
+    GL(glUniform2f(uniform(c->shade, "texel"), 1 / (float)c->width, 1 / (float)c->height));
+    set_background(c->shade, scene);
     run_pass(c, from, to);
     return true;
+}
+
+/* Puts the background behind the points where they were drawn: the depth test finds where. */
+static bool finish_in_place(rgl_canvas *c, const rgl_scene *scene, mospt_err *err)
+{
+    if (!use_program(&c->background, RGL_BACKGROUND_FRAGMENT, err)) return false;
+    set_background(c->background, scene);
+    use_layer(c, c->points.fbo, true);
+    GL(glDepthFunc(GL_LEQUAL));
+    GL(glDepthMask(GL_FALSE));
+    GL(glBindVertexArray(c->nothing));
+    GL(glDrawArrays(GL_TRIANGLES, 0, 3));
+    c->shown = c->points.fbo;
+    return true;
+}
+
+static void copy_to_window(const rgl_canvas *c, GLuint from)
+{
+    GLint w = (GLint)c->width, h = (GLint)c->height;
+    GL(glBindFramebuffer(GL_READ_FRAMEBUFFER, from));
+    GL(glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0));
+    GL(glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST));
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, 0));
 }
 
 bool rgl_canvas_finish(rgl_canvas *canvas, const rgl_scene *scene, bool to_window, mospt_err *err)
 {
     const rgl_layer *last = &canvas->points;
+    if (!canvas->adding && scene->fill_px == 0 && !(scene->edl_strength > 0)) {
+        if (!finish_in_place(canvas, scene, err)) return false;
+        if (to_window) copy_to_window(canvas, canvas->shown);
+        return true;
+    }
     if (canvas->adding) {
         if (!resolve(canvas, scene, err)) return false;
         last = &canvas->resolved;
@@ -273,5 +307,6 @@ bool rgl_canvas_finish(rgl_canvas *canvas, const rgl_scene *scene, bool to_windo
         if (!fill(canvas, scene, last, err)) return false;
         last = &canvas->filled;
     }
-    return shade(canvas, scene, last, to_window ? 0 : canvas->picture.fbo, err);
+    canvas->shown = canvas->picture.fbo;
+    return shade(canvas, scene, last, to_window ? 0 : canvas->shown, err);
 }

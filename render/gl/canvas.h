@@ -19,11 +19,11 @@ typedef struct {
                            tested against */
     rgl_layer resolved; /* of the sums */
     rgl_layer filled;
-    rgl_layer picture;                  /* only colours */
-    GLuint resolve, fill, light, plain; /* programs; 0: none yet; the last with and without
-                                          eye-dome lighting, which costs three times as much */
-    GLuint nothing;                     /* a vertex array without arrays */
-    bool adding;                        /* the picture in hand has come to its second drawing */
+    rgl_layer picture;                       /* only colours */
+    GLuint shown;                            /* framebuffer of the finished picture */
+    GLuint resolve, fill, shade, background; /* programs; 0: none yet */
+    GLuint nothing;                          /* a vertex array without arrays */
+    bool adding; /* the picture in hand has come to its second drawing */
 } rgl_canvas;
 
 void rgl_canvas_init(rgl_canvas *canvas);

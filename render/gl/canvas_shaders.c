@@ -1,10 +1,10 @@
 #include "render/gl/program.h"
 
-/* One triangle that covers the screen, made of nothing. */
+/* One triangle that covers the screen, made of nothing, where the farthest depth is. */
 const char RGL_SCREEN_VERTEX[] = "void main()\n"
                                  "{\n"
                                  "    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, "
-                                 "gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);\n"
+                                 "gl_VertexID == 2 ? 3.0 : -1.0, 1.0, 1.0);\n"
                                  "}\n";
 
 /* Section 2 of rgl.h: from sums to colours and depths. */
@@ -76,6 +76,13 @@ const char RGL_FILL_FRAGMENT[] =
     "    depth = sum.a / weights;\n"
     "}\n";
 
+/* Section 5 of rgl.h, for pictures that need nothing else. */
+const char RGL_BACKGROUND_FRAGMENT[] =
+    "uniform vec3 top, bottom;\n"
+    "uniform float height;\n"
+    "out vec4 result;\n"
+    "void main() { result = vec4(mix(bottom, top, gl_FragCoord.y / height), 1.0); }\n";
+
 /* Eye-dome lighting (Boucheny 2009): a pixel is darkened by how much nearer its neighbours are, in
  * log2 of the distance, so that the same shape looks the same at every range. Opposite neighbours
  * are taken together, which cancels the slope of a surface seen at a grazing angle: ground that
@@ -87,10 +94,11 @@ const char RGL_SHADE_FRAGMENT[] =
     "uniform vec2 edl;\n" /* strength, radius in pixels */
     "uniform vec3 top, bottom;\n"
     "uniform float height;\n"
+    "uniform vec2 texel;\n" /* 1 / size: a lookup that ends at the border by itself costs less */
     "out vec4 result;\n"
     "float depth_at(ivec2 p)\n"
     "{\n"
-    "    return texelFetch(depths, clamp(p, ivec2(0), textureSize(depths, 0) - 1), 0).r;\n"
+    "    return texture(depths, (vec2(p) + 0.5) * texel).r;\n"
     "}\n"
     "float nearer(float here, ivec2 p, ivec2 step)\n"
     "{\n"
@@ -112,11 +120,9 @@ const char RGL_SHADE_FRAGMENT[] =
     "        return;\n"
     "    }\n"
     "    vec3 colour = texelFetch(colours, p, 0).rgb;\n"
-    "#ifdef EDL\n"
     "    int r = int(edl.y + 0.5), q = int(0.7071 * edl.y + 0.5);\n"
     "    float sum = nearer(here, p, ivec2(r, 0)) + nearer(here, p, ivec2(0, r)) +\n"
     "                nearer(here, p, ivec2(q, q)) + nearer(here, p, ivec2(q, -q));\n"
     "    colour *= exp(-edl.x * sum);\n"
-    "#endif\n"
     "    result = vec4(colour, 1.0);\n"
     "}\n";

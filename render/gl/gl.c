@@ -273,7 +273,7 @@ static bool gl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t h
                            mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    GL(glBindFramebuffer(GL_FRAMEBUFFER, from_window ? 0 : g->canvas.picture.fbo));
+    GL(glBindFramebuffer(GL_FRAMEBUFFER, from_window ? 0 : g->canvas.shown));
     GL(glReadBuffer(from_window ? GL_BACK : GL_COLOR_ATTACHMENT0));
     GL(glPixelStorei(GL_PACK_ALIGNMENT, 1));
     GL(glReadPixels(0, 0, (GLsizei)width, (GLsizei)height, GL_RGB, GL_UNSIGNED_BYTE, rgb));

@@ -12,7 +12,7 @@ bool rgl_program_create(const char *defines, const char *vertex, const char *fra
 
 extern const char RGL_POINTS_VERTEX[], RGL_POINTS_FRAGMENT[];
 extern const char RGL_SCREEN_VERTEX[], RGL_RESOLVE_FRAGMENT[], RGL_FILL_FRAGMENT[],
-    RGL_SHADE_FRAGMENT[], RGL_PRESENT_FRAGMENT[];
+    RGL_BACKGROUND_FRAGMENT[], RGL_SHADE_FRAGMENT[], RGL_PRESENT_FRAGMENT[];
 extern const char RGL_TEXT_VERTEX[], RGL_TEXT_FRAGMENT[];
 
 #ifdef NDEBUG
