@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TILE_PX = 4, TILE_PIXELS = TILE_PX * TILE_PX, LEVELS_MAX = 16 };
+enum { TILE_PX = 4, TILE_PIXELS = TILE_PX * TILE_PX, COVERED = 6, LEVELS_MAX = 16 };
 /* Clearly behind: noise and the thickness of a wall are not another room. */
 #define BEHIND 1.01f
 
@@ -154,14 +154,14 @@ static void sort_tiles(float *sorted, uint32_t width)
                         order(sorted + (size_t)i * width, sorted + (size_t)(i + k) * width, width);
 }
 
-/* The farther of the two in the middle: half of a tile must be covered. */
+/* As many pixels of a tile must be covered. */
 static void find_tiles(rend_occlusion *o)
 {
     level *l = &o->levels[0];
     for (uint32_t y = 0; y < l->height; y++) {
         gather(o, y);
         sort_tiles(o->sorted, l->width);
-        memcpy(l->nearest + (size_t)y * l->width, o->sorted + (size_t)(TILE_PIXELS / 2) * l->width,
+        memcpy(l->nearest + (size_t)y * l->width, o->sorted + (size_t)(COVERED - 1) * l->width,
                l->width * sizeof *l->nearest);
     }
 }

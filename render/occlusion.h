@@ -5,10 +5,11 @@
  * so that the selection can ask before it spends points on a node, or has it read from the disk.
  *
  * A wall of points has gaps, and a tree is nearly a wall: a tile of 4 x 4 pixels is as far away as
- * the middle one of its pixels when they are sorted by depth, so what covers less than half of a
- * tile hides nothing, and what covers more closes it. Each tile then takes the farthest depth of
- * itself and its neighbours, so that nothing hides beyond its own silhouette. Above that, a tile is
- * the farthest of four.
+ * the sixth of its pixels when they are sorted by depth. So what covers less of it hides nothing,
+ * and what covers more closes it: of a wall with a tenth of gaps every tile does, of a tree with
+ * half of them one tile in ten does not, and a node covers a hundred tiles. Each tile then takes
+ * the farthest depth of itself and its neighbours, so that nothing hides beyond its own silhouette.
+ * Above that, a tile is the farthest of four.
  *
  * A cube is hidden if its nearest corner is clearly behind every tile that it covers. Depths may be
  * those of another view, such as the frame before: the cube is then looked at from there, grown by

@@ -158,7 +158,7 @@ static void what_is_hidden_does_not_show_and_is_not_drawn(void **unused)
     render_site site;
     rend_shot_result all, seen;
     uint32_t differ = 0;
-    render_rooms_make(1500000, &site);
+    render_rooms_make(3000000, &site);
     const mospt_metadata *m = &site.dataset->metadata;
     rend_shot_options o = {.camera = {.has_eye = true, .has_target = true}};
     for (int a = 0; a < 3; a++)
