@@ -519,7 +519,7 @@ static void count_frame(viewer *v, const rend_figures *before, double ms)
     rend_figures now;
     rend_stage_figures(v->stage, &now);
     rend_pace_note(&v->pace, now.points_total - before->points_total,
-                   now.uploaded_bytes - before->uploaded_bytes, ms);
+                   now.uploaded_bytes - before->uploaded_bytes, v->progress != REND_PART, ms);
     v->frame_ms = ms;
     v->result.mean_ms += ms; /* the sum as yet */
     v->result.slowest_ms = fmax(v->result.slowest_ms, ms);
