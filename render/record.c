@@ -196,8 +196,11 @@ static double fade_at(const recorder *r, uint64_t frame)
 static rend_take_frame describe_frame(const recorder *r, uint64_t frame)
 {
     double time_s = (double)frame * seconds_per_frame(r);
-    return (rend_take_frame){
-        .number = frame, .time_s = time_s, .fade = fade_at(r, frame), .title_s = time_s};
+    return (rend_take_frame){.number = frame,
+                             .time_s = time_s,
+                             .rate = 1 / seconds_per_frame(r),
+                             .fade = fade_at(r, frame),
+                             .title_s = time_s};
 }
 
 /* As in a path's file; nothing without a clip box. */

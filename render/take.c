@@ -3,6 +3,7 @@
 #include "render/caption.h"
 #include "render/choice.h"
 #include "render/engine.h"
+#include "render/pace.h"
 #include "render/panorama.h"
 
 #include <inttypes.h>
@@ -31,6 +32,7 @@ struct rend_take {
     uint8_t *raw;   /* one pass as it was drawn, owned */
     uint32_t *sums; /* [canvas_width * canvas_height * 3], owned */
     rend_take_times spent;
+    rend_pace pace; /* live */
 };
 
 static double now_s(void)
@@ -221,14 +223,32 @@ static bool draw_words(rend_take *t, const rend_take_frame *frame, uint8_t *rgb,
 }
 
 /* Draws a pass; its figures and legend are taken before those of the expected one. */
-static bool draw_pass(rend_take *t, const rend_view_of *view, rend_figures *figures, mospt_err *err)
+/* As a window does: no more points and uploads than fit into the frame's time. */
+static bool draw_live(rend_take *t, const rend_view_of *view, mospt_err *err)
 {
     rend_progress ignored;
+    rend_view_of in_time = *view;
+    const rend_allowance allowed = {.upload_bytes = rend_pace_bytes(&t->pace)};
+    uint64_t fits = rend_pace_points(&t->pace);
+    if (in_time.budget_points > fits) in_time.budget_points = fits;
+    return rend_stage_frame(t->stage, &in_time, &allowed, &ignored, err);
+}
+
+/* A live pass that is on its way to the encoder. */
+static void note_pass(rend_take *t, const rend_figures *before, double ms)
+{
+    rend_figures now;
+    rend_stage_figures(t->stage, &now);
+    rend_pace_note(&t->pace, now.points_total - before->points_total,
+                   now.uploaded_bytes - before->uploaded_bytes, true, ms);
+}
+
+static bool draw_pass(rend_take *t, const rend_view_of *view, rend_figures *figures, mospt_err *err)
+{
     double start = now_s(), waited;
     rend_stage_figures(t->stage, figures);
     waited = figures->waited_s;
-    bool ok = t->options.live ? rend_stage_frame(t->stage, view, NULL, &ignored, err)
-                              : rend_stage_still(t->stage, view, err);
+    bool ok = t->options.live ? draw_live(t, view, err) : rend_stage_still(t->stage, view, err);
     if (!ok) return false;
     t->legend = *rend_stage_legend(t->stage);
     rend_stage_figures(t->stage, figures);
@@ -327,18 +347,23 @@ bool rend_take_run(rend_take *take, const rend_curve *curve, const rend_take_fra
                         .has_clip = moment.has_clip || take->options.look.has_clip,
                         .clip = moment.has_clip ? moment.clip : take->options.look.clip,
                         .budget_points = budget_of(take, &moment)};
+    if (take->options.live && take->pace.target_ms == 0)
+        rend_pace_init(&take->pace, frame->rate * take->views * take->subframes);
     if (!take->direct)
         memset(take->sums, 0,
                (size_t)take->canvas_width * take->canvas_height * 3 * sizeof *take->sums);
     for (uint32_t pass = 0; rend_take_view(take, curve, frame->time_s, pass, &view); pass++) {
-        rend_figures figures;
+        rend_figures before, figures;
         uint8_t *rgb = take->direct ? picture : take->raw;
+        double start = now_s();
+        rend_stage_figures(take->stage, &before);
         if (!draw_pass(take, &view, &figures, err)) return false;
         count(&figures, pass % take->views, &now, out);
         bool more = rend_take_view(take, curve, frame->time_s, pass + 1, &following) ||
                     (next != NULL && rend_take_view(take, curve, *next, 0, &following));
         if (more && !expect(take, &following, err)) return false;
         if (!read_back(take, &view, rgb, err) || !draw_words(take, frame, rgb, err)) return false;
+        if (take->options.live) note_pass(take, &before, 1e3 * (now_s() - start));
         if (!take->direct) add_pass(take, pass % take->views);
     }
     if (take->direct) fade_directly(take, frame->fade, picture);

@@ -21,7 +21,8 @@ typedef struct {
     double eye_distance;    /* metres; 0: 0.064 */
     bool panorama;     /* all around, equirectangular; the path says where, and which way is the
                           middle; its field of view does not matter */
-    bool live;         /* takes what is resident, as a window does, and does not wait */
+    bool live;         /* takes what is resident, and as many points as can be drawn at the film's
+                          rate, as a window does, and does not wait */
     const char *title; /* over the first seconds; NULL or "": none */
     bool counter;      /* frame number and time in a corner */
     bool legend;       /* what the colours mean */
@@ -34,7 +35,7 @@ typedef struct {
 typedef struct {
     uint64_t number;
     double time_s;
-    double rate;    /* frames a second, for the counter */
+    double rate;    /* frames a second, which live pictures keep up with; > 0 for them */
     double fade;    /* 0 black, 1 as it is */
     double title_s; /* since the title appeared; beyond its time there is none */
 } rend_take_frame;
