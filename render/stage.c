@@ -2,6 +2,7 @@
 
 #include "render/cache.h"
 #include "render/match.h"
+#include "render/order.h"
 #include "render/pages.h"
 
 #include <assert.h>
@@ -15,9 +16,6 @@ enum {
     LOADER_THREADS = 2,
     TAKE_MAX = 32,
 };
-/* What is drawn alike: splats of the least width, those that are squares for being small, others.
- */
-enum { GROUP_SMALLEST, GROUP_SMALL, GROUP_WIDE, GROUPS };
 /* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
 #define UPLOAD_BYTES_PER_FRAME (64 * REND_MIB)
 /* While less than this share of the points is hidden, depths are read back now and then only. */
@@ -27,12 +25,6 @@ enum { LOOK_EVERY = 8, LOOKS_AT_REST = 6 };
 #define OCCLUSION_POINTS_MIN 200000
 #define OCCLUDER_SHARE 2 /* of the budget, for what hides */
 #define WAITING_BYTES_MAX (128 * REND_MIB)
-/* Points of neighbouring cells are up to two cells apart: splats this much wider than a cell leave
- * few holes. */
-#define SPLAT_PER_CELL 1.25f
-/* Wider ones are discs, if nobody asks for anything else: up to three pixels nobody tells the two
- * apart, and a disc costs the early depth test. */
-#define SQUARE_PX_MAX 3.0f
 
 struct rend_stage {
     const mospt_dataset *dataset;
@@ -63,13 +55,8 @@ struct rend_stage {
     const rend_selection *selection;
     uint32_t *pinned; /* [pinned_count] nodes of the frame in hand, owned */
     uint32_t pinned_count, pinned_capacity;
-    uint64_t *order; /* [order_capacity], owned: draws by splat size, see key_of() */
-    uint32_t order_capacity;
-    uint32_t *wanted;       /* [node count], owned: what to ask the loader for */
-    int32_t *first, *count; /* [range_capacity], owned */
-    uint32_t range_count, range_capacity;
-    rgl_batch batches[GROUPS];
-    uint32_t batch_start[GROUPS], batch_count;
+    rend_order order;
+    uint32_t *wanted; /* [node count], owned: what to ask the loader for */
 
     rend_frame frame;
     rend_clip clip; /* of the selection, if the view has one */
@@ -245,9 +232,7 @@ void rend_stage_destroy(rend_stage *stage)
     free(stage->residency);
     free(stage->wanted);
     free(stage->pinned);
-    free(stage->order);
-    free(stage->first);
-    free(stage->count);
+    rend_order_fini(&stage->order);
     free(stage);
 }
 
@@ -401,131 +386,27 @@ static bool use_colours(rend_stage *s, const rend_look *look, mospt_err *err)
     return true;
 }
 
-/* ---- what to draw in which order ---- */
-
-static float point_px_max(const rend_look *look)
-{
-    if (look->size_mode == REND_SIZE_FIXED) return fmaxf(look->point_px, 1);
-    return look->point_px_max > 0 ? fmaxf(look->point_px_max, 1) : REND_POINT_PX_MAX_DEFAULT;
-}
-
-static float point_px_min(const rend_look *look)
-{
-    if (look->size_mode == REND_SIZE_FIXED) return point_px_max(look);
-    return fminf(fmaxf(look->point_px_min, 1), point_px_max(look));
-}
-
-static int group_of(const rend_look *look, const rend_draw *d)
-{
-    float widest = look->size_mode == REND_SIZE_AUTO ? SPLAT_PER_CELL * d->widest_px : INFINITY;
-    widest = fminf(widest, point_px_max(look));
-    if (widest <= 1.001f * point_px_min(look)) return GROUP_SMALLEST;
-    return widest > SQUARE_PX_MAX ? GROUP_WIDE : GROUP_SMALL;
-}
-
-static rgl_batch batch_of(const rend_look *look, int group)
-{
-    static const rgl_shape shapes[] = {[REND_SHAPE_SQUARE] = RGL_SQUARE,
-                                       [REND_SHAPE_ROUND] = RGL_ROUND,
-                                       [REND_SHAPE_PARABOLOID] = RGL_PARABOLOID};
-    bool narrow =
-        group == GROUP_SMALL || (group == GROUP_SMALLEST && point_px_min(look) <= SQUARE_PX_MAX);
-    return (rgl_batch){.shape = look->shape != REND_SHAPE_AUTO ? shapes[look->shape]
-                                : narrow                       ? RGL_SQUARE
-                                                               : RGL_ROUND,
-                       .smallest = group == GROUP_SMALLEST};
-}
-
-/* By group, and then the order of the selection. This order, not the one in which nodes were read,
- * decides which of two points at the same depth is seen. */
-static uint64_t key_of(const rend_look *look, const rend_draw *d, uint32_t index)
-{
-    return (uint64_t)group_of(look, d) << 32 | index;
-}
-
-static int compare_keys(const void *a, const void *b)
-{
-    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
-    return (x > y) - (x < y);
-}
-
-static bool sort_draws(rend_stage *s, const rend_view_of *view, mospt_err *err)
-{
-    uint32_t count = s->selection->draw_count;
-    if (count > s->order_capacity) {
-        uint64_t *larger = realloc(s->order, count * sizeof *larger);
-        if (larger == NULL) return mospt_err_nomem(err, count * sizeof *larger);
-        s->order = larger, s->order_capacity = count;
-    }
-    for (uint32_t i = 0; i < count; i++)
-        s->order[i] = key_of(&view->look, &s->selection->draws[i], i);
-    if (count > 0) qsort(s->order, count, sizeof *s->order, compare_keys);
-    return true;
-}
+/* ---- what to draw ---- */
 
 static const rend_draw *draw_at(const rend_stage *s, uint32_t place_in_order)
 {
-    return &s->selection->draws[s->order[place_in_order] & UINT32_MAX];
-}
-
-static bool add_range(rend_stage *s, uint32_t first, uint32_t count, bool join, mospt_err *err)
-{
-    if (join && s->first[s->range_count - 1] + s->count[s->range_count - 1] == (int32_t)first) {
-        s->count[s->range_count - 1] += (int32_t)count;
-        return true;
-    }
-    if (s->range_count == s->range_capacity) {
-        uint32_t capacity = s->range_capacity > 0 ? 2 * s->range_capacity : 1024;
-        int32_t *f = realloc(s->first, capacity * sizeof *f);
-        if (f != NULL) s->first = f;
-        int32_t *c = realloc(s->count, capacity * sizeof *c);
-        if (c != NULL) s->count = c;
-        if (f == NULL || c == NULL) return mospt_err_nomem(err, capacity * sizeof *f);
-        s->range_capacity = capacity;
-    }
-    s->first[s->range_count] = (int32_t)first;
-    s->count[s->range_count++] = (int32_t)count;
-    return true;
-}
-
-/* The leading points of a node, through the runs of pages that hold them. */
-static bool add_node(rend_stage *s, const rend_draw *d, mospt_err *err)
-{
-    const rend_place *place = rend_cache_use(s->gpu, d->node);
-    uint32_t left = d->count;
-    for (uint32_t r = 0; place != NULL && left > 0 && r < place->run_count; r++) {
-        uint32_t part = place->runs[r].count * PAGE_POINTS;
-        if (part > left) part = left;
-        bool join = s->range_count > s->batch_start[s->batch_count - 1];
-        if (!add_range(s, place->runs[r].first * PAGE_POINTS, part, join, err)) return false;
-        left -= part;
-    }
-    return true;
+    return rend_order_at(&s->order, place_in_order);
 }
 
 /* Batches of the draws from .. to - 1 of the order that are on the GPU. */
 static bool make_batches(rend_stage *s, const rend_look *look, uint32_t from, uint32_t to,
                          mospt_err *err)
 {
-    s->range_count = s->batch_count = 0;
+    rend_order_begin(&s->order);
     for (uint32_t i = from; i < to; i++) {
         const rend_draw *d = draw_at(s, i);
-        int group = (int)(s->order[i] >> 32);
-        if (i == from || group != (int)(s->order[i - 1] >> 32)) {
-            s->batch_start[s->batch_count] = s->range_count;
-            s->batches[s->batch_count++] = batch_of(look, group);
-        }
         if (s->residency[d->node] != REND_RESIDENT) continue;
-        if (!add_node(s, d, err)) return false;
+        const rend_place *place = rend_cache_use(s->gpu, d->node);
+        if (!rend_order_add(&s->order, look, i, place, PAGE_POINTS, err)) return false;
         s->figures.points_drawn += d->count;
         s->figures.nodes_drawn++;
     }
-    for (uint32_t b = 0; b < s->batch_count; b++) {
-        uint32_t end = b + 1 < s->batch_count ? s->batch_start[b + 1] : s->range_count;
-        s->batches[b].first = s->first + s->batch_start[b];
-        s->batches[b].count = s->count + s->batch_start[b];
-        s->batches[b].range_count = end - s->batch_start[b];
-    }
+    rend_order_end(&s->order);
     return true;
 }
 
@@ -539,12 +420,12 @@ static rgl_scene make_scene(const rend_stage *s, const rend_view_of *view)
         .octants = look->size_mode == REND_SIZE_AUTO ? s->selection->octants : NULL,
         .octant_nodes = s->selection->draw_count,
         .grid_bits = s->dataset->metadata.grid.bits,
-        .splat_scale = SPLAT_PER_CELL,
+        .splat_scale = REND_SPLAT_PER_CELL,
         .splat_size = look->size_mode == REND_SIZE_WORLD
                           ? (float)(look->point_m / s->dataset->metadata.grid.step)
                           : 0,
-        .px_min = point_px_min(look),
-        .px_max = point_px_max(look),
+        .px_min = rend_order_px_min(look),
+        .px_max = rend_order_px_max(look),
         .blend_slab = look->blend_slab,
         .fill_px = look->fill_px,
         .edl_strength = look->no_edl ? 0 : (look->edl_strength > 0 ? look->edl_strength : 1) * 24,
@@ -586,7 +467,7 @@ static bool run_selection(rend_stage *s, const rend_view_of *view, const rend_se
     s->figures.nodes_hidden = s->selection->hidden;
     s->figures.points_hidden = s->selection->points_hidden;
     s->figures.budget_spent = s->selection->stopped;
-    return sort_draws(s, view, err);
+    return rend_order_sort(&s->order, s->selection, &view->look, err);
 }
 
 /* The depths of what has been drawn are what things can be hidden behind. Without memory for them
@@ -766,7 +647,7 @@ static bool draw_part(rend_stage *s, uint64_t most, mospt_err *err)
     s->figures.points_total += s->figures.points_drawn - before.points_drawn;
     if (s->hand.again)
         s->figures.points_drawn = before.points_drawn, s->figures.nodes_drawn = before.nodes_drawn;
-    if (!rgl_draw(s->gl, &scene, s->batches, s->batch_count, parts | view->parts, err))
+    if (!rgl_draw(s->gl, &scene, s->order.batches, s->order.batch_count, parts | view->parts, err))
         return false;
     s->hand.begun = !last;
     s->hand.again = s->hand.again || end;
@@ -926,7 +807,8 @@ static bool draw_all(rend_stage *s, const rend_view_of *view, int first, int all
         uint32_t to = end_of_chunk(s, from);
         int parts = all | (from == 0 ? first : 0) | (to == total ? last : 0);
         if (!bring(s, from, to, err) || !make_batches(s, &view->look, from, to, err)) return false;
-        if (!rgl_draw(s->gl, &scene, s->batches, s->batch_count, parts, err)) return false;
+        if (!rgl_draw(s->gl, &scene, s->order.batches, s->order.batch_count, parts, err))
+            return false;
         from = to;
     } while (from < total);
     unpin_all(s);
