@@ -111,14 +111,14 @@ static void report_json(const cli_options *o, const rend_record_result *r)
     json_t *stages = json_pack("{s:f, s:f, s:f, s:f, s:f}", "selecting", r->spent.selecting,
                                "loading", r->spent.loading, "drawing", r->spent.drawing,
                                "reading_back", r->spent.reading, "encoding", r->encoding_s);
-    cli_write_json(stdout,
-                   json_pack("{s:o, s:I, s:I, s:I, s:f, s:f, s:o, s:I, s:I, s:I, s:s}", "film",
-                             cli_text_json(o->output), "frames", (json_int_t)r->frames, "drawn",
-                             (json_int_t)r->drawn, "resumed_at", (json_int_t)r->resumed_at,
-                             "seconds", r->seconds, "starting_seconds", r->starting_s,
-                             "stage_seconds", stages, "points_most", (json_int_t)r->points_most,
-                             "over_budget", (json_int_t)r->over_budget, "damaged_nodes",
-                             (json_int_t)r->damaged_nodes, "renderer", r->renderer));
+    cli_write_json(
+        stdout, json_pack("{s:o, s:I, s:I, s:I, s:f, s:f, s:f, s:o, s:I, s:I, s:I, s:s}", "film",
+                          cli_text_json(o->output), "frames", (json_int_t)r->frames, "drawn",
+                          (json_int_t)r->drawn, "resumed_at", (json_int_t)r->resumed_at, "seconds",
+                          r->seconds, "starting_seconds", r->starting_s, "processor_seconds",
+                          r->cpu_s, "stage_seconds", stages, "points_most",
+                          (json_int_t)r->points_most, "over_budget", (json_int_t)r->over_budget,
+                          "damaged_nodes", (json_int_t)r->damaged_nodes, "renderer", r->renderer));
 }
 
 void cli_record_report(const cli_options *options, const rend_record_result *r)

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
 
 enum { RATE_DEFAULT = 30, RATE_MAX = 1000 };
@@ -24,7 +25,7 @@ typedef struct {
     rend_writer *writer;
     rend_scout *scout;
     rend_record_result result;
-    double start_s;
+    double start_s, start_cpu_s;
 } recorder;
 
 static double now_s(void)
@@ -32,6 +33,14 @@ static double now_s(void)
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static double cpu_s(void)
+{
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    return (double)(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
+           1e-6 * (double)(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
 }
 
 static double seconds_per_frame(const recorder *r)
@@ -395,7 +404,8 @@ static void note_result(recorder *r)
 bool rend_record(const mospt_dataset *dataset, const rend_record_options *options,
                  rend_record_result *result, mospt_err *err)
 {
-    recorder r = {.dataset = dataset, .options = *options, .start_s = now_s()};
+    recorder r = {
+        .dataset = dataset, .options = *options, .start_s = now_s(), .start_cpu_s = cpu_s()};
     bool ok = start(&r, err);
     if (ok) {
         r.result.resumed_at = rend_reel_next(r.reel);
@@ -409,6 +419,7 @@ bool rend_record(const mospt_dataset *dataset, const rend_record_options *option
     rend_curve_destroy(r.curve);
     r.result.frames = r.options.end - r.options.first;
     r.result.seconds = now_s() - r.start_s;
+    r.result.cpu_s = cpu_s() - r.start_cpu_s;
     if (ok && result != NULL) *result = r.result;
     return ok;
 }
