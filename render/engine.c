@@ -21,7 +21,7 @@ static bool open_cpu(const rend_engine_options *options, rgl **out, mospt_err *e
 
 static bool open_gl(rend_engine *out, mospt_err *err)
 {
-    rend_engine e = {0};
+    rend_engine e = {.renderer = REND_RENDERER_GL};
     if (!rgl_context_create(&e.context, err)) return false;
     if (!rgl_gl_create(&e.gl, err)) {
         rgl_context_destroy(e.context);
@@ -42,7 +42,7 @@ bool rend_engine_open(const rend_engine_options *options, rend_engine *out, mosp
         }
         rend_engine_close(&e);
     }
-    *out = (rend_engine){0};
+    *out = (rend_engine){.renderer = REND_RENDERER_CPU};
     return open_cpu(options, &out->gl, err);
 }
 
@@ -53,12 +53,13 @@ bool rend_engine_open_window(const rend_engine_options *options, rend_engine *ou
     if (options->renderer != REND_RENDERER_CPU) {
         if (!rgl_gl_create(&gl, err)) return false;
         if (options->renderer == REND_RENDERER_GL || !is_software(rgl_renderer(gl))) {
-            out->gl = gl;
+            *out = (rend_engine){.gl = gl, .renderer = REND_RENDERER_GL};
             return true;
         }
         rgl_destroy(gl);
     }
     if (!open_cpu(options, &cpu, err)) return false;
+    out->renderer = REND_RENDERER_CPU;
     if (rgl_present_create(cpu, rcpu_picture, &out->gl, err)) return true;
     rgl_destroy(cpu);
     return false;

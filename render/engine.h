@@ -5,8 +5,9 @@
 #include "render/options.h"
 
 typedef struct {
-    rgl *gl;              /* owned */
-    rgl_context *context; /* owned; NULL: none is needed, or a window has it */
+    rgl *gl;                /* owned */
+    rgl_context *context;   /* owned; NULL: none is needed, or a window has it */
+    rend_renderer renderer; /* what was taken: never REND_RENDERER_AUTO */
 } rend_engine;
 
 /* For pictures without a window. REND_RENDERER_AUTO takes the processor where OpenGL would draw on

@@ -115,6 +115,8 @@ static void print_look(FILE *f, const rend_look *look)
     for (int c = 0; c < 3; c++)
         fprintf(f, ", %.9g, %.9g", (double)look->background_top[c],
                 (double)look->background_bottom[c]);
+    fprintf(f, ", %.9g, %d, %.9g, %u", (double)look->point_px_min, (int)look->shape,
+            (double)look->blend_slab, look->fill_px);
     fprintf(f, ", %d, %.17g, %.17g, %d, %.17g, %.17g, ", (int)look->has_range, look->range[0],
             look->range[1], (int)look->map, look->brightness, look->gamma);
     print_text(f, look->attribute);
@@ -145,7 +147,7 @@ static char *describe_job(const recorder *r, rfilm_codec codec)
             (int)t->counter);
     fprintf(f, "\"budget\": %" PRIu64 ", \"node\": %.9g, \"hidden\": %d, \"renderer\": %d,\n",
             t->limits.budget_points, (double)t->limits.min_node_px, (int)t->limits.no_occlusion,
-            (int)t->engine.renderer);
+            (int)rend_take_renderer_kind(r->take));
     print_look(f, &t->look);
     fprintf(f, "\"title\": ");
     print_text(f, t->title);
@@ -366,7 +368,9 @@ static bool start(recorder *r, mospt_err *err)
     if (!set_defaults(r, err) || !rend_take_fits(&r->options.take, err) || !colours_fit(r, err) ||
         !can_report(r, err))
         return false;
-    return rend_curve_create(r->options.path, &r->curve, err) && open_reel(r, err);
+    /* The reel after what draws: pictures of two back ends do not mix. */
+    return rend_curve_create(r->options.path, &r->curve, err) &&
+           rend_take_create(r->dataset, &r->options.take, &r->take, err) && open_reel(r, err);
 }
 
 static bool draw_all(recorder *r, mospt_err *err)
@@ -374,9 +378,7 @@ static bool draw_all(recorder *r, mospt_err *err)
     const rend_take_options *o = &r->options.take;
     size_t size = (size_t)o->width * o->height * 3 * (o->bits / 8);
     uint64_t next = rend_reel_next(r->reel);
-    if (!rend_take_create(r->dataset, o, &r->take, err) ||
-        !rend_writer_start(r->reel, size, &r->writer, err))
-        return false;
+    if (!rend_writer_start(r->reel, size, &r->writer, err)) return false;
     if (!o->live && !rend_scout_start(r->dataset, r->take, r->curve, seconds_per_frame(r), next,
                                       r->options.end, &r->scout, err))
         return false;
@@ -394,7 +396,7 @@ static void note_result(recorder *r)
     rend_figures figures;
     rend_take_figures(r->take, &figures);
     r->result.spent = rend_take_spent(r->take);
-    r->result.encoding_s = rend_writer_busy_s(r->writer);
+    if (r->writer != NULL) r->result.encoding_s = rend_writer_busy_s(r->writer);
     r->result.damaged_nodes = figures.damaged_nodes;
     r->result.damaged_points = figures.damaged_points;
     r->result.damage = figures.damage;
@@ -410,7 +412,7 @@ bool rend_record(const mospt_dataset *dataset, const rend_record_options *option
     if (ok) {
         r.result.resumed_at = rend_reel_next(r.reel);
         ok = r.result.resumed_at == r.options.end || draw_all(&r, err);
-        if (ok && r.take != NULL) note_result(&r);
+        if (ok) note_result(&r);
     }
     rend_writer_destroy(r.writer);
     rend_take_destroy(r.take);

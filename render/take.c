@@ -390,3 +390,8 @@ const char *rend_take_renderer(const rend_take *take)
 {
     return rgl_renderer(take->engine.gl);
 }
+
+rend_renderer rend_take_renderer_kind(const rend_take *take)
+{
+    return take->engine.renderer;
+}

@@ -84,4 +84,7 @@ uint32_t rend_take_views(const rend_take *take);
 
 rend_take_times rend_take_spent(const rend_take *take);
 void rend_take_figures(const rend_take *take, rend_figures *out);
-const char *rend_take_renderer(const rend_take *take);
+const char *rend_take_renderer(const rend_take *take); /* its name */
+
+/* Which of the back ends draws: never REND_RENDERER_AUTO. */
+rend_renderer rend_take_renderer_kind(const rend_take *take);

@@ -441,6 +441,51 @@ static void another_recording_does_not_go_on_with_an_unfinished_one(void **unuse
     scene_fini(&s);
 }
 
+/* Stops a film at its fifth frame; tells whether another goes on with it. */
+static bool goes_on(const scene *s, const rend_record_options *first,
+                    const rend_record_options *second)
+{
+    mospt_err err = {0}, refusal = {0};
+    rend_record_options stopped = *first, next = *second;
+    char *path = core_path(s->site.folder, "other.mkv");
+    stopped.output = next.output = path;
+    stopped.progress = stop_at_five;
+    CORE_FAILS(rend_record(s->site.dataset, &stopped, NULL, &err), MOSPT_ECANCELLED);
+    bool ok = rend_record(s->site.dataset, &next, NULL, &refusal);
+    /* Nothing unfinished is left for the next question. */
+    stopped.progress = NULL;
+    if (!ok) CORE_NEED(rend_record(s->site.dataset, &stopped, NULL, &err));
+    free(path);
+    /* MOSPT_EIO: a machine without OpenGL. */
+    assert_true(ok || refusal.code == MOSPT_EINVAL ||
+                (refusal.code == MOSPT_EIO && next.take.engine.renderer == REND_RENDERER_GL));
+    return ok;
+}
+
+static void what_draws_and_how_belongs_to_the_recording(void **unused)
+{
+    (void)unused;
+    scene s;
+    scene_make(&s);
+    const rend_record_options usual = options_for(&s.path, NULL);
+    rend_record_options gl = usual, cpu = usual, other = usual;
+    gl.take.engine.renderer = REND_RENDERER_GL;
+    cpu.take.engine.renderer = REND_RENDERER_CPU;
+    assert_false(goes_on(&s, &cpu, &gl));
+    assert_true(goes_on(&s, &cpu, &cpu));
+    /* The usual choice is one of both, and not the other. */
+    assert_true(goes_on(&s, &usual, &gl) != goes_on(&s, &usual, &cpu));
+    other.take.look.blend_slab = REND_BLEND_DEFAULT;
+    assert_false(goes_on(&s, &usual, &other));
+    other = usual, other.take.look.fill_px = 2;
+    assert_false(goes_on(&s, &usual, &other));
+    other = usual, other.take.look.shape = REND_SHAPE_ROUND;
+    assert_false(goes_on(&s, &usual, &other));
+    other = usual, other.take.look.point_px_min = 2;
+    assert_false(goes_on(&s, &usual, &other));
+    scene_fini(&s);
+}
+
 static void the_report_has_a_line_for_each_frame(void **unused)
 {
     (void)unused;
@@ -517,6 +562,7 @@ int main(void)
         cmocka_unit_test(fades_words_and_sixteen_bits),
         cmocka_unit_test(live_films_have_all_frames_too),
         cmocka_unit_test(another_recording_does_not_go_on_with_an_unfinished_one),
+        cmocka_unit_test(what_draws_and_how_belongs_to_the_recording),
         cmocka_unit_test(the_report_has_a_line_for_each_frame),
         cmocka_unit_test(what_makes_no_sense_is_refused),
     };
