@@ -9,7 +9,7 @@ typedef struct {
 
 typedef struct {
     lanes_i inside;
-    lanes_f x, y; /* pixels from the lower left corner */
+    lanes_f x, y; /* pixels from the lower left corner; 0 outside, where it could be any number */
     lanes_f w;
 } rcpu_places;
 
@@ -60,12 +60,12 @@ static inline rcpu_places rcpu_project(const rcpu_view *v, const rcpu_block *blo
     lanes_f half_x = lanes_all(0.5f * (float)v->size.width),
             half_y = lanes_all(0.5f * (float)v->size.height);
     lanes_f each = 1.0f / w;
-    lanes_i shown = clip_of(v, block);
+    lanes_i inside = clip_of(v, block) & (w >= v->near_w) & (w <= v->far_w) & (cx <= w) &
+                     (cx >= -w) & (cy <= w) & (cy >= -w);
     return (rcpu_places){
-        .inside = shown & (w >= v->near_w) & (w <= v->far_w) & (cx <= w) & (cx >= -w) & (cy <= w) &
-                  (cy >= -w),
-        .x = (cx * each) * half_x + half_x,
-        .y = (cy * each) * half_y + half_y,
+        .inside = inside,
+        .x = lanes_pick(inside, (cx * each) * half_x + half_x, lanes_all(0)),
+        .y = lanes_pick(inside, (cy * each) * half_y + half_y, lanes_all(0)),
         .w = w,
     };
 }
