@@ -822,14 +822,16 @@ static bool may_hide(const rend_stage *s, const rend_view_of *view)
            (s->selection->stopped || s->selection->points > OCCLUSION_POINTS_MIN);
 }
 
-/* What the picture will look like, from a part of its points: with cells nearly twice as wide,
- * where splats are, too. */
+/* What hides others, from a part of the points: with cells nearly twice as wide, and as wide as
+ * that, whatever the size of the picture's own points is, so that walls are closed. */
 static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *err)
 {
-    rend_select_input input = input_of(s, view);
+    rend_view_of closed = *view;
+    closed.look.size_mode = REND_SIZE_AUTO;
+    rend_select_input input = input_of(s, &closed);
     if (view->budget_points != REND_ALL) input.budget_points /= OCCLUDER_SHARE;
-    if (view->look.size_mode == REND_SIZE_AUTO) input.cell_px = 1.4f;
-    return run_selection(s, view, &input, err) && draw_all(s, view, RGL_BEGIN, 0, 0, err) &&
+    input.cell_px = 1.4f;
+    return run_selection(s, &closed, &input, err) && draw_all(s, &closed, RGL_BEGIN, 0, 0, err) &&
            learn_occlusion(s, err);
 }
 
