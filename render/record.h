@@ -45,7 +45,7 @@ typedef struct {
     double starting_s;     /* of them before the first frame: graphics driver, caches */
     rend_take_times spent; /* seconds of each stage in this run */
     double encoding_s;
-    double cpu_s; /* of all processors together, of the whole process */
+    double cpu_s;         /* of all processors together, of the whole process */
     uint64_t points_most; /* in a frame of this run */
     uint64_t over_budget; /* frames of this run that drew more than their budget: none */
     uint32_t damaged_nodes;
