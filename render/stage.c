@@ -548,13 +548,9 @@ static bool fetch_ahead(rend_stage *s, const rend_camera *camera, uint32_t *want
     const rend_view_of *view = &s->hand.view;
     rend_frame_make(camera, &s->dataset->metadata.grid, s->bounds_low, s->bounds_high, view->width,
                     view->height, &frame);
-    const rend_select_input input = {.hierarchy = &s->dataset->hierarchy,
-                                     .grid = &s->dataset->metadata.grid,
-                                     .frame = &frame,
-                                     .residency = s->residency,
-                                     .budget_points = view->budget_points,
-                                     .min_node_px = view->min_node_px,
-                                     .clip = view->look.has_clip ? &s->clip : NULL};
+    rend_select_input input = input_of(s, view);
+    input.frame = &frame;
+    input.residency = s->residency;
     if (!rend_select_run(s->ahead, &input, &selection, err)) return false;
     uint64_t bytes = 0, most = rend_cache_limit(s->ram) / 4;
     for (uint32_t i = 0; i < selection->request_count && bytes < most; i++) {

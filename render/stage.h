@@ -33,7 +33,7 @@ typedef struct {
                                               would not reject first */
     uint32_t nodes_drawn, nodes_visited;
     uint32_t nodes_hidden;  /* left out behind others, with all below them */
-    uint64_t points_hidden; /* what would have been drawn of these, without what is below */
+    uint64_t points_hidden; /* all points of these, without what is below */
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
     uint32_t gpu_halved;                               /* times, for want of graphics memory */

@@ -61,10 +61,6 @@ static const char *cpu_renderer(const rgl *gl)
 static bool cpu_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     cpu_rgl *c = (cpu_rgl *)gl;
-    if (vertex_count > INT32_MAX) /* what a range addresses */
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                             "a GPU cache of %llu points is more than the %d that can be addressed",
-                             (unsigned long long)vertex_count, INT32_MAX);
     rcpu_memory_release(c->arena, arena_bytes(c));
     c->arena_size = vertex_count;
     c->arena = rcpu_memory_take(arena_bytes(c));

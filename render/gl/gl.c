@@ -88,10 +88,6 @@ static void set_vertex_format(const gl_rgl *g)
 static bool gl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     gl_rgl *g = (gl_rgl *)gl;
-    if (vertex_count > INT32_MAX) /* what a GLint addresses */
-        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                             "a GPU cache of %llu points is more than the %d that can be addressed",
-                             (unsigned long long)vertex_count, INT32_MAX);
     GLsizeiptr size = (GLsizeiptr)((vertex_count > 0 ? vertex_count : 1) * sizeof(mospt_vertex));
     glDeleteBuffers(1, &g->arena); /* first: there may not be room for both */
     g->arena = 0;

@@ -12,6 +12,10 @@ const char *rgl_renderer(const rgl *gl)
 
 bool rgl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
+    if (vertex_count > INT32_MAX) /* what a range of a batch addresses */
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "a GPU cache of %llu points is more than the %d that can be addressed",
+                             (unsigned long long)vertex_count, INT32_MAX);
     return gl->driver->arena_create(gl, vertex_count, err);
 }
 

@@ -148,8 +148,9 @@ bool rgl_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height,
                      mospt_err *err);
 
 /* Depths (0 near, 1 nothing) of the nearest points of the last scene in a square around a pixel,
- * clamped to the picture. x, y     from the top left out      [(2 radius + 1)^2], rows from the top
- */
+ * clamped to the picture.
+ * x, y     from the top left
+ * out      [(2 radius + 1)^2], rows from the top */
 bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err);
 
 /* Depths of all pixels of the last scene, or of what has been drawn of it so far.
