@@ -297,6 +297,14 @@ static void warn_of_damage(uint32_t nodes, const mospt_err *first)
             nodes == 1 ? " is" : "s are", text);
 }
 
+static void warn_of_resets(uint32_t resets)
+{
+    if (resets > 0)
+        fprintf(stderr,
+                "instantpoints: the graphics driver was reset; what it was drawing was drawn "
+                "again, and nothing is missing\n");
+}
+
 static void report_shot(const cli_options *o, const rend_shot_result *r)
 {
     if (!o->json) {
@@ -336,6 +344,7 @@ static int command_shot(const cli_options *o)
     bool ok = fits && rend_shot(p.dataset, &options, &result, &err);
     if (ok) {
         report_shot(o, &result);
+        warn_of_resets(result.resets);
         warn_of_damage(result.damaged_nodes, &result.damage);
         if (result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     }
@@ -355,6 +364,7 @@ static int command_record(const cli_options *o)
     bool ok = place_open(o, NULL, &p, &err) && cli_record(o, p.dataset, should_stop, &result, &err);
     if (ok) {
         cli_record_report(o, &result);
+        warn_of_resets(result.resets);
         warn_of_damage(result.damaged_nodes, &result.damage);
         if (result.damaged_nodes > 0) p.code = EXIT_LEFT_OUT;
     }

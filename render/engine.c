@@ -27,6 +27,7 @@ static bool open_gl(rend_engine *out, mospt_err *err)
         rgl_context_destroy(e.context);
         return false;
     }
+    rgl_set_renew(e.gl, rgl_context_renew, e.context);
     *out = e;
     return true;
 }
@@ -46,7 +47,7 @@ bool rend_engine_open(const rend_engine_options *options, rend_engine *out, mosp
     return open_cpu(options, &out->gl, err);
 }
 
-bool rend_engine_open_window(const rend_engine_options *options, rend_engine *out, mospt_err *err)
+static bool open_in_window(const rend_engine_options *options, rend_engine *out, mospt_err *err)
 {
     rgl *gl = NULL, *cpu = NULL;
     *out = (rend_engine){0};
@@ -63,6 +64,14 @@ bool rend_engine_open_window(const rend_engine_options *options, rend_engine *ou
     if (rgl_present_create(cpu, rcpu_picture, &out->gl, err)) return true;
     rgl_destroy(cpu);
     return false;
+}
+
+bool rend_engine_open_window(const rend_engine_options *options, rgl_renew *renew, void *user,
+                             rend_engine *out, mospt_err *err)
+{
+    if (!open_in_window(options, out, err)) return false;
+    rgl_set_renew(out->gl, renew, user);
+    return true;
 }
 
 void rend_engine_close(rend_engine *engine)

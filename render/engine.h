@@ -15,7 +15,9 @@ typedef struct {
  * errors   MOSPT_EIO: REND_RENDERER_GL without a driver; MOSPT_EINVAL, MOSPT_ENOMEM */
 bool rend_engine_open(const rend_engine_options *options, rend_engine *out, mospt_err *err);
 
-/* For the window whose context is current. */
-bool rend_engine_open_window(const rend_engine_options *options, rend_engine *out, mospt_err *err);
+/* For the window whose context is current.
+ * renew    makes another one, should it be lost */
+bool rend_engine_open_window(const rend_engine_options *options, rgl_renew *renew, void *user,
+                             rend_engine *out, mospt_err *err);
 
 void rend_engine_close(rend_engine *engine);

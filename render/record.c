@@ -400,6 +400,7 @@ static void note_result(recorder *r)
     r->result.damaged_nodes = figures.damaged_nodes;
     r->result.damaged_points = figures.damaged_points;
     r->result.damage = figures.damage;
+    r->result.resets = figures.resets;
     strncpy(r->result.renderer, rend_take_renderer(r->take), sizeof r->result.renderer - 1);
 }
 

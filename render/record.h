@@ -51,6 +51,7 @@ typedef struct {
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage;
+    uint32_t resets; /* of the graphics driver, after which it went on */
     char renderer[128];
 } rend_record_result;
 

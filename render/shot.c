@@ -14,6 +14,16 @@ static double now_ms(void)
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
+static bool draw_and_read(rend_stage *stage, rgl *gl, const rend_view_of *view, uint8_t *rgb,
+                          mospt_err *err)
+{
+    do {
+        if (!rend_stage_still(stage, view, err)) return false;
+        if (rgl_read_pixels(gl, false, view->width, view->height, rgb, err)) return true;
+    } while (rend_stage_recover(stage, err));
+    return false;
+}
+
 static bool draw(const mospt_dataset *dataset, rgl *gl, const rend_shot_options *options,
                  const rend_view_of *view, uint8_t *rgb, rend_shot_result *result, mospt_err *err)
 {
@@ -21,8 +31,7 @@ static bool draw(const mospt_dataset *dataset, rgl *gl, const rend_shot_options 
     rend_figures figures;
     double start = now_ms();
     bool ok = rend_stage_create(dataset, gl, &options->limits, NULL, NULL, &stage, err) &&
-              rend_stage_still(stage, view, err) &&
-              rgl_read_pixels(gl, false, view->width, view->height, rgb, err) &&
+              draw_and_read(stage, gl, view, rgb, err) &&
               (!options->legend ||
                rend_legend_draw(rend_stage_legend(stage), view->width, view->height, rgb, err));
     if (ok) {
@@ -40,6 +49,7 @@ static bool draw(const mospt_dataset *dataset, rgl *gl, const rend_shot_options 
             .damaged_nodes = figures.damaged_nodes,
             .damaged_points = figures.damaged_points,
             .damage = figures.damage,
+            .resets = figures.resets,
         };
         strncpy(result->renderer, rgl_renderer(gl), sizeof result->renderer - 1);
     }

@@ -26,6 +26,7 @@ typedef struct {
     uint32_t damaged_nodes;   /* not in the picture */
     uint64_t damaged_points;
     mospt_err damage;   /* of the first of them */
+    uint32_t resets;    /* of the graphics driver, after which it went on */
     char renderer[128]; /* the graphics driver */
 } rend_shot_result;
 

@@ -23,7 +23,8 @@ enum {
 enum { LOOK_EVERY = 8, LOOKS_AT_REST = 6 };
 /* Fewer points than that are not worth a look at what they hide. */
 #define OCCLUSION_POINTS_MIN 200000
-#define OCCLUDER_SHARE 2 /* of the budget, for what hides */
+#define OCCLUDER_SHARE 2  /* of the budget, for what hides */
+enum { RESETS_MAX = 50 }; /* a driver that is reset so often will be again */
 #define WAITING_BYTES_MAX (128 * REND_MIB)
 
 struct rend_stage {
@@ -696,13 +697,28 @@ static bool halve_gpu(rend_stage *s, mospt_err *err)
     return make_gpu(s, half, err);
 }
 
+bool rend_stage_recover(rend_stage *stage, mospt_err *err)
+{
+    if (!rgl_is_lost(stage->gl) || stage->figures.resets == RESETS_MAX) return false;
+    stage->figures.resets++;
+    stage->hand.begun = false;
+    unpin_all(stage);
+    return rgl_recover(stage->gl, err) && make_gpu(stage, stage->page_count, err);
+}
+
+/* True if what has failed can be tried again. */
+static bool get_over(rend_stage *s, mospt_err *err)
+{
+    return rend_stage_recover(s, err) || (!rgl_is_lost(s->gl) && halve_gpu(s, err));
+}
+
 bool rend_stage_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
                       rend_progress *progress, mospt_err *err)
 {
     static const rend_allowance unlimited = {0};
     if (allowed == NULL) allowed = &unlimited;
     while (!draw_frame(stage, view, allowed, progress, err))
-        if (!halve_gpu(stage, err)) return false;
+        if (!get_over(stage, err)) return false;
     return true;
 }
 
@@ -853,7 +869,7 @@ static bool draw_still(rend_stage *stage, const rend_view_of *view, mospt_err *e
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)
 {
     while (!draw_still(stage, view, err))
-        if (!halve_gpu(stage, err)) return false;
+        if (!get_over(stage, err)) return false;
     return true;
 }
 

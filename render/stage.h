@@ -37,12 +37,13 @@ typedef struct {
     bool budget_spent;
     uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
     uint32_t gpu_halved;                               /* times, for want of graphics memory */
-    uint64_t loaded_bytes;                             /* since the start */
-    uint64_t uploaded_bytes;                           /* since the start */
-    uint64_t points_total;                             /* drawn since the start, part by part */
-    double waited_s;  /* for the loader, by rend_stage_still(), since the start */
-    uint32_t pending; /* nodes that this view still misses */
-    uint32_t ahead;   /* nodes that are read because they will be seen shortly */
+    uint32_t resets;         /* of the graphics driver, after which all was made anew */
+    uint64_t loaded_bytes;   /* since the start */
+    uint64_t uploaded_bytes; /* since the start */
+    uint64_t points_total;   /* drawn since the start, part by part */
+    double waited_s;         /* for the loader, by rend_stage_still(), since the start */
+    uint32_t pending;        /* nodes that this view still misses */
+    uint32_t ahead;          /* nodes that are read because they will be seen shortly */
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage; /* of the first damaged node; code MOSPT_OK without any */
@@ -97,6 +98,11 @@ bool rend_stage_expect(rend_stage *stage, const rend_view_of *view, mospt_err *e
 
 /* Draws all that the budget allows, reading it through the caches in as many parts as they need. */
 bool rend_stage_still(rend_stage *stage, const rend_view_of *view, mospt_err *err);
+
+/* After a call to the graphics back end has failed, by whoever reads back what the stage has drawn:
+ * true if that was a reset of the driver, which is got over: the picture has to be drawn again. The
+ * stage's own calls do that by themselves. */
+bool rend_stage_recover(rend_stage *stage, mospt_err *err);
 
 void rend_stage_figures(rend_stage *stage, rend_figures *out);
 

@@ -278,6 +278,18 @@ static bool read_back(rend_take *t, const rend_view_of *view, uint8_t *rgb, mosp
     return true;
 }
 
+/* What comes next is read from the disk while the graphics driver is at work. */
+static bool run_pass(rend_take *t, const rend_view_of *view, const rend_view_of *following,
+                     rend_figures *figures, uint8_t *rgb, mospt_err *err)
+{
+    do {
+        if (!draw_pass(t, view, figures, err)) return false;
+        if (following != NULL && !expect(t, following, err)) return false;
+        if (read_back(t, view, rgb, err)) return true;
+    } while (rend_stage_recover(t->stage, err));
+    return false;
+}
+
 /* Adds what was read back to its place on the canvas, reduced. */
 static void add_pass(rend_take *t, uint32_t view)
 {
@@ -357,12 +369,11 @@ bool rend_take_run(rend_take *take, const rend_curve *curve, const rend_take_fra
         uint8_t *rgb = take->direct ? picture : take->raw;
         double start = now_s();
         rend_stage_figures(take->stage, &before);
-        if (!draw_pass(take, &view, &figures, err)) return false;
-        count(&figures, pass % take->views, &now, out);
         bool more = rend_take_view(take, curve, frame->time_s, pass + 1, &following) ||
                     (next != NULL && rend_take_view(take, curve, *next, 0, &following));
-        if (more && !expect(take, &following, err)) return false;
-        if (!read_back(take, &view, rgb, err) || !draw_words(take, frame, rgb, err)) return false;
+        if (!run_pass(take, &view, more ? &following : NULL, &figures, rgb, err)) return false;
+        count(&figures, pass % take->views, &now, out);
+        if (!draw_words(take, frame, rgb, err)) return false;
         if (take->options.live) note_pass(take, &before, 1e3 * (now_s() - start));
         if (!take->direct) add_pass(take, pass % take->views);
     }

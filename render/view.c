@@ -40,7 +40,7 @@ typedef struct {
     mospt_dataset *newer; /* owned; NULL: the dataset is the one that was given */
     rend_watch watch;
     double watched_at;
-    uint32_t gpu_halved;
+    uint32_t gpu_halved, resets;
     const rend_view_options *options;
     rgl_window *window;
     rend_engine engine;
@@ -538,11 +538,13 @@ static bool frame(viewer *v, mospt_err *err)
         return true;
     }
     v->view.width = width, v->view.height = height;
-    fit_text(v);
     bool last = is_last(v) && v->options->screenshot != NULL;
     rend_figures before;
     rend_stage_figures(v->stage, &before);
+    if (v->options->reset_at > 0 && v->result.frames == v->options->reset_at)
+        rgl_pretend_reset(v->engine.gl);
     if (!draw_points(v, last, err)) return false;
+    fit_text(v);                    /* now: with another context, it is gone */
     if (v->progress != REND_PART) { /* else the picture before stays on the screen */
         if (!draw_words(v, err)) return false;
         if (last && !write_screenshot(v, err)) return false;
@@ -631,12 +633,24 @@ static bool watch(viewer *v, mospt_err *err)
     }
 }
 
+/* The letters were in the context that is lost, too. */
+static bool renew_window(void *user, mospt_err *err)
+{
+    viewer *v = user;
+    rgl_text_destroy(v->text);
+    v->text = NULL, v->text_scale = 0;
+    return rgl_window_renew(v->window, err);
+}
+
 /* What went wrong on the way and was got over. */
 static void tell_faults(viewer *v)
 {
     rend_figures figures;
     char text[80];
     rend_stage_figures(v->stage, &figures);
+    if (figures.resets != v->resets)
+        tell(v, "the graphics driver was reset: everything was sent to it again");
+    v->resets = figures.resets;
     if (figures.gpu_halved == v->gpu_halved) return;
     v->gpu_halved = figures.gpu_halved;
     snprintf(text, sizeof text, "graphics memory is short: nodes get %llu MB of it now",
@@ -694,7 +708,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
     v->view.camera = v->home;
     return rgl_window_create(o->title != NULL ? o->title : v->dataset->path, v->view.width,
                              v->view.height, &v->window, err) &&
-           rend_engine_open_window(&o->engine, &v->engine, err) &&
+           rend_engine_open_window(&o->engine, renew_window, v, &v->engine, err) &&
            rend_stage_create(v->dataset, v->engine.gl, &o->limits, on_loaded, v, &v->stage, err);
 }
 
@@ -709,6 +723,7 @@ bool rend_view(const mospt_dataset *dataset, const rend_view_options *options,
         v.result.damaged_nodes = figures.damaged_nodes;
         v.result.damaged_points = figures.damaged_points;
         v.result.damage = figures.damage;
+        v.result.resets = figures.resets;
         if (v.result.frames > 0) v.result.mean_ms /= (double)v.result.frames;
         if (result != NULL) *result = v.result;
     }

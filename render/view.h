@@ -15,13 +15,16 @@ typedef struct {
     const char *screenshot; /* of the window, words and all, written before it closes; NULL: none */
     const char *path;       /* camera path to edit, see render/strip.h; NULL: a new one */
     bool help;              /* with the help shown */
+    uint64_t reset_at;      /* for tests: before that frame the graphics driver seems to be
+                               reset; 0: never */
     bool (*should_stop)(void); /* asked a few times a second; true closes the window; NULL: never */
 } rend_view_options;
 
 typedef struct {
     uint64_t frames;
     double slowest_ms, mean_ms;
-    uint32_t swaps; /* times that the dataset became another one, and the window went on with it */
+    uint32_t swaps;  /* times that the dataset became another one, and the window went on with it */
+    uint32_t resets; /* of the graphics driver, after which it went on */
     uint32_t damaged_nodes;
     uint64_t damaged_points;
     mospt_err damage;   /* of the first of them */

@@ -445,6 +445,35 @@ static void an_arena_that_does_not_fit_can_be_made_smaller(void **unused)
     teardown(&s);
 }
 
+/* A reset cannot be had here: all that is in another context than before must be made anew. */
+static void after_a_reset_the_picture_is_the_same(void **unused)
+{
+    (void)unused;
+    stand s;
+    mospt_err err = {0};
+    static uint8_t before[PIXELS][3];
+    setup(&s);
+    s.scene.blend_slab = 0.01f, s.scene.fill_px = 2;
+    s.scene.edl_strength = 24, s.scene.edl_radius_px = 1;
+    fill_plane(&s, 16, 0, RED);
+    fill_plane(&s, 16, 2, BLUE);
+    add(&s, 20, 20, 8, 0, GREEN);
+    draw(&s);
+    memcpy(before, s.rgb, sizeof before);
+    rgl_set_renew(s.gl, rgl_context_renew, s.context);
+    assert_false(rgl_is_lost(s.gl));
+    rgl_pretend_reset(s.gl);
+    CORE_FAILS(rgl_arena_upload(s.gl, 0, s.points, s.count, &err), MOSPT_EIO);
+    assert_true(rgl_is_lost(s.gl));
+    CORE_NEED(rgl_recover(s.gl, &err));
+    assert_false(rgl_is_lost(s.gl));
+    CORE_NEED(rgl_arena_create(s.gl, MOST, &err));
+    draw(&s);
+    assert_memory_equal(before, s.rgb, sizeof before);
+    assert_true(count_of(&s, BLACK) < PIXELS / 2);
+    teardown(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -461,6 +490,7 @@ int main(void)
         cmocka_unit_test(uploads_are_seen_by_what_is_drawn_after_them),
         cmocka_unit_test(an_upload_larger_than_the_ring_arrives),
         cmocka_unit_test(an_arena_that_does_not_fit_can_be_made_smaller),
+        cmocka_unit_test(after_a_reset_the_picture_is_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

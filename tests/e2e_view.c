@@ -6,6 +6,8 @@
 #include <png.h>
 #include <stdlib.h>
 
+enum { SHOWN_WIDTH = 640, SHOWN_HEIGHT = 400 };
+
 static void a_window_shows_the_dataset_and_a_line_of_figures(void **unused)
 {
     (void)unused;
@@ -29,6 +31,51 @@ static void a_window_shows_the_dataset_and_a_line_of_figures(void **unused)
     assert_true(white > 50);
     free(rgb);
     free(path);
+    render_site_fini(&site);
+}
+
+/* The window's picture, without the lines of words at its top. */
+static void show(const render_site *site, rend_renderer renderer, uint64_t reset_at, uint8_t *rgb)
+{
+    rend_view_result result;
+    mospt_err err = {0};
+    char *path = core_path(site->folder, "reset.png");
+    const rend_view_options options = {.frames = 40,
+                                       .width = SHOWN_WIDTH,
+                                       .height = SHOWN_HEIGHT,
+                                       .screenshot = path,
+                                       .reset_at = reset_at,
+                                       .engine = {.renderer = renderer}};
+    CORE_NEED(rend_view(site->dataset, &options, &result, &err));
+    assert_int_equal(result.frames, 40);
+    assert_int_equal(result.resets, reset_at > 0);
+    assert_int_equal(result.no_words.code, MOSPT_OK);
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    assert_true(image.width == SHOWN_WIDTH && image.height == SHOWN_HEIGHT);
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    free(path);
+}
+
+static void a_window_goes_on_in_another_context(void **unused)
+{
+    (void)unused;
+    enum { SIZE = 3 * SHOWN_WIDTH * SHOWN_HEIGHT, WORDS = 3 * SHOWN_WIDTH * 70 };
+    render_site site;
+    uint8_t *before = malloc(SIZE), *after = malloc(SIZE);
+    render_site_make(CORE_CLUSTERED, 60000, NULL, &site);
+    for (int r = 0; r < 2; r++) {
+        rend_renderer renderer = r == 0 ? REND_RENDERER_GL : REND_RENDERER_CPU;
+        show(&site, renderer, 0, before);
+        show(&site, renderer, 20, after);
+        assert_memory_equal(before + WORDS, after + WORDS, SIZE - WORDS);
+        uint32_t white = 0; /* words are there again */
+        for (size_t i = 0; i < 3 * SHOWN_WIDTH * 24; i += 3)
+            white += after[i] > 230 && after[i + 2] > 230;
+        assert_true(white > 50);
+    }
+    free(before), free(after);
     render_site_fini(&site);
 }
 
@@ -111,6 +158,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_window_shows_the_dataset_and_a_line_of_figures),
         cmocka_unit_test(a_window_goes_on_with_what_its_dataset_becomes),
+        cmocka_unit_test(a_window_goes_on_in_another_context),
         cmocka_unit_test(damage_is_counted_and_the_rest_is_shown),
         cmocka_unit_test(without_a_display_one_sentence_says_so),
     };

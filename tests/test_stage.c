@@ -481,6 +481,95 @@ static void another_generation_takes_over_what_is_the_same(void **unused)
     render_site_fini(&more);
 }
 
+typedef struct {
+    uint32_t asked, refuses; /* times */
+} reset_driver;
+
+static bool renew(void *user, mospt_err *err)
+{
+    reset_driver *d = user;
+    return ++d->asked > d->refuses ||
+           mospt_err_set(err, MOSPT_EIO, mospt_nowhere(), "it is not back yet");
+}
+
+static void a_driver_that_is_reset_changes_no_picture(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    reset_driver driver = {.refuses = 2};
+    rend_figures figures;
+    mospt_err err = {0};
+    const rend_limits limits = {.gpu_cache_bytes = 256 << 10}; /* several parts to a picture */
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    rgl_record whole = still(&site, 0, 0, &figures);
+    start(&site, &limits, &s);
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    rgl_set_renew(s.gl, renew, &driver);
+    rgl_pretend_reset(s.gl);
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    assert_true(rgl_null_record(s.gl).picture_hash == whole.picture_hash);
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.resets, 1);
+    assert_int_equal(driver.asked, 3);
+    /* It is found when the picture is read: the picture is drawn again. */
+    uint8_t rgb[3];
+    rgl_pretend_reset(s.gl);
+    CORE_FAILS(rgl_read_pixels(s.gl, false, 1, 1, rgb, &err), MOSPT_EIO);
+    CORE_NEED(rend_stage_recover(s.stage, &err));
+    CORE_NEED(rend_stage_still(s.stage, &s.view, &err));
+    assert_true(rgl_null_record(s.gl).picture_hash == whole.picture_hash);
+    stop(&s);
+    render_site_fini(&site);
+}
+
+static void a_window_goes_on_after_a_reset(void **unused)
+{
+    (void)unused;
+    render_site site;
+    scene s;
+    reset_driver driver = {0};
+    rend_figures figures;
+    mospt_err err = {0};
+    const rend_limits limits = {0};
+    rend_progress progress;
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    start(&site, &limits, &s);
+    rgl_set_renew(s.gl, renew, &driver);
+    converge(&s);
+    uint64_t picture = rgl_null_record(s.gl).picture_hash;
+    uint64_t uploaded = rgl_null_record(s.gl).points_uploaded;
+    rend_stage_figures(s.stage, &figures);
+    uint64_t loaded = figures.loaded_bytes;
+    rgl_pretend_reset(s.gl);
+    CORE_NEED(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err));
+    assert_int_equal(progress, REND_AGAIN); /* it is all gone, but in memory */
+    converge(&s);
+    assert_true(rgl_null_record(s.gl).picture_hash == picture);
+    assert_int_equal(rgl_null_record(s.gl).points_uploaded, 2 * uploaded);
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.loaded_bytes, loaded);
+    assert_int_equal(figures.resets, 1);
+    /* In the middle of a picture that is drawn in parts. */
+    const rend_allowance few = {.points = 1};
+    s.view.camera.target[0] += 1;
+    CORE_NEED(rend_stage_frame(s.stage, &s.view, &few, &progress, &err));
+    assert_int_equal(progress, REND_PART);
+    rgl_pretend_reset(s.gl);
+    CORE_NEED(rend_stage_frame(s.stage, &s.view, &few, &progress, &err));
+    converge(&s);
+    rend_stage_figures(s.stage, &figures);
+    assert_int_equal(figures.resets, 2);
+    /* Nobody gives another context. */
+    rgl_set_renew(s.gl, NULL, NULL);
+    rgl_pretend_reset(s.gl);
+    CORE_FAILS(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err), MOSPT_EIO);
+    assert_true(rgl_is_lost(s.gl));
+    CORE_FAILS(rend_stage_frame(s.stage, &s.view, NULL, &progress, &err), MOSPT_EIO);
+    stop(&s);
+    render_site_fini(&site);
+}
+
 static void graphics_memory_that_is_short_is_used_as_far_as_it_goes(void **unused)
 {
     (void)unused;
@@ -707,6 +796,8 @@ int main(void)
         cmocka_unit_test(uploads_of_a_frame_keep_to_what_is_allowed),
         cmocka_unit_test(what_was_hidden_comes_back_when_the_wall_is_gone),
         cmocka_unit_test(another_generation_takes_over_what_is_the_same),
+        cmocka_unit_test(a_driver_that_is_reset_changes_no_picture),
+        cmocka_unit_test(a_window_goes_on_after_a_reset),
         cmocka_unit_test(graphics_memory_that_is_short_is_used_as_far_as_it_goes),
         cmocka_unit_test(what_will_be_seen_is_read_ahead),
     };

@@ -100,22 +100,32 @@ static void fini(rgl_context *c)
     eglTerminate(c->display);
 }
 
-bool rgl_context_create(rgl_context **out, mospt_err *err)
+static bool open_any(rgl_context *c, mospt_err *err)
 {
-    rgl_context *c = calloc(1, sizeof *c);
-    if (c == NULL) return mospt_err_nomem(err, sizeof *c);
     for (int attempt = 0; attempt < TRY_COUNT; attempt++) {
-        if (try(attempt, c)) {
-            *out = c;
-            return true;
-        }
+        if (try(attempt, c)) return true;
         fini(c);
     }
-    free(c);
+    *c = (rgl_context){.display = EGL_NO_DISPLAY};
     return mospt_err_set(
         err, MOSPT_EIO, mospt_nowhere(),
         "no graphics driver offers OpenGL 3.3 through EGL; Mesa's software renderer would do "
         "(packages libegl1 and libgl1-mesa-dri)");
+}
+
+bool rgl_context_create(rgl_context **out, mospt_err *err)
+{
+    rgl_context *c = calloc(1, sizeof *c);
+    if (c == NULL) return mospt_err_nomem(err, sizeof *c);
+    if (!open_any(c, err)) return free(c), false;
+    *out = c;
+    return true;
+}
+
+bool rgl_context_renew(void *context, mospt_err *err)
+{
+    fini(context);
+    return open_any(context, err);
 }
 
 void rgl_context_destroy(rgl_context *context)

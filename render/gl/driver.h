@@ -14,6 +14,9 @@ typedef struct {
                         mospt_err *err);
     bool (*read_depth)(rgl *gl, int x, int y, int radius, float *out, mospt_err *err);
     bool (*read_depths)(rgl *gl, float *out, mospt_err *err);
+    /* In another context, where nothing is of what was in the one before. NULL: needs no context.
+     */
+    bool (*restart)(rgl *gl, mospt_err *err);
 } rgl_driver;
 
 /* Reads the window's back buffer, for whichever backend has drawn into it. */
@@ -21,4 +24,10 @@ bool rgl_gl_read_window(uint32_t width, uint32_t height, uint8_t *rgb, mospt_err
 
 struct rgl {
     const rgl_driver *driver;
+    rgl_renew *renew;
+    void *user; /* of renew() */
+    bool is_lost, pretends;
 };
+
+/* Fails because of a reset. */
+bool rgl_set_lost(rgl *gl, mospt_err *err);

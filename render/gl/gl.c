@@ -57,13 +57,19 @@ static const char *gl_renderer(const rgl *gl)
     return ((const gl_rgl *)gl)->renderer;
 }
 
-/* Errors that are no mistake of ours: no memory, or the driver has reset. */
-static bool is_healthy(const gl_rgl *g, const char *what, mospt_err *err)
+/* The driver tells of a reset until it is over, and not any more then. */
+static bool is_reset(const gl_rgl *g)
 {
-    if (g->robust && glGetGraphicsResetStatusARB() != GL_NO_ERROR)
-        return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
-                             "the graphics driver was reset; the dataset is unharmed, start again");
+    return g->base.is_lost || g->base.pretends ||
+           (g->robust && glGetGraphicsResetStatusARB() != GL_NO_ERROR);
+}
+
+/* Errors that are no mistake of ours: no memory, or the driver was reset. */
+static bool is_healthy(gl_rgl *g, const char *what, mospt_err *err)
+{
+    if (is_reset(g)) return rgl_set_lost(&g->base, err);
     GLenum error = glGetError();
+    if (error == GL_CONTEXT_LOST) return rgl_set_lost(&g->base, err);
     if (error == GL_OUT_OF_MEMORY)
         return mospt_err_set(
             err, MOSPT_ENOMEM, mospt_nowhere(),
@@ -72,6 +78,13 @@ static bool is_healthy(const gl_rgl *g, const char *what, mospt_err *err)
         return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
                              "the graphics driver reports error 0x%04x at %s", error, what);
     return true;
+}
+
+/* After calls of which one may have failed: if the driver was reset, that is why. */
+static bool conclude(gl_rgl *g, bool ok, const char *what, mospt_err *err)
+{
+    if (ok || is_reset(g)) return is_healthy(g, what, err);
+    return false;
 }
 
 static void set_vertex_format(const gl_rgl *g)
@@ -106,9 +119,9 @@ static bool gl_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertice
 {
     gl_rgl *g = (gl_rgl *)gl;
     if (count == 0) return true;
-    return rgl_staging_upload(&g->staging, g->arena, first * sizeof *vertices, vertices,
-                              count * sizeof *vertices, err) &&
-           is_healthy(g, "an upload", err);
+    bool ok = rgl_staging_upload(&g->staging, g->arena, first * sizeof *vertices, vertices,
+                                 count * sizeof *vertices, err);
+    return conclude(g, ok, "an upload", err);
 }
 
 static bool make_points_program(int kind, points_program *out, mospt_err *err)
@@ -220,10 +233,9 @@ static bool draw_points(gl_rgl *g, const rgl_scene *scene, const rgl_batch *batc
     return true;
 }
 
-static bool gl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
-                    int parts, mospt_err *err)
+static bool draw(gl_rgl *g, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
+                 int parts, mospt_err *err)
 {
-    gl_rgl *g = (gl_rgl *)gl;
     bool begin = (parts & RGL_BEGIN) != 0, again = (parts & RGL_AGAIN) != 0;
     if (!rgl_canvas_fit(&g->canvas, scene, err)) return false;
     if (begin || !again) {
@@ -234,9 +246,15 @@ static bool gl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, u
     if (again && (!rgl_canvas_add(&g->canvas, err) ||
                   !draw_points(g, scene, batches, batch_count, true, err)))
         return false;
-    if (parts & RGL_END && !rgl_canvas_finish(&g->canvas, scene, (parts & RGL_TO_WINDOW) != 0, err))
-        return false;
-    return is_healthy(g, "a frame", err);
+    return (parts & RGL_END) == 0 ||
+           rgl_canvas_finish(&g->canvas, scene, (parts & RGL_TO_WINDOW) != 0, err);
+}
+
+static bool gl_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches, uint32_t batch_count,
+                    int parts, mospt_err *err)
+{
+    gl_rgl *g = (gl_rgl *)gl;
+    return conclude(g, draw(g, scene, batches, batch_count, parts, err), "a frame", err);
 }
 
 /* GL's first row is the lowest. */
@@ -306,17 +324,6 @@ static bool gl_read_depths(rgl *gl, float *out, mospt_err *err)
     return is_healthy(g, "reading depths", err);
 }
 
-static const rgl_driver GL_DRIVER = {
-    .destroy = gl_destroy,
-    .renderer = gl_renderer,
-    .arena_create = gl_arena_create,
-    .arena_upload = gl_arena_upload,
-    .draw = gl_draw,
-    .read_pixels = gl_read_pixels,
-    .read_depth = gl_read_depth,
-    .read_depths = gl_read_depths,
-};
-
 static GLuint make_octants_texture(void)
 {
     GLuint texture = 0;
@@ -327,27 +334,49 @@ static GLuint make_octants_texture(void)
     return texture;
 }
 
-bool rgl_gl_create(rgl **out, mospt_err *err)
+/* Makes all that is there without anybody asking for it. */
+static bool begin(gl_rgl *g, mospt_err *err)
 {
     if (epoxy_gl_version() < 33)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "the graphics driver offers OpenGL %d.%d, 3.3 is needed",
                              epoxy_gl_version() / 10, epoxy_gl_version() % 10);
-    gl_rgl *g = calloc(1, sizeof *g);
-    if (g == NULL) return mospt_err_nomem(err, sizeof *g);
-    g->base.driver = &GL_DRIVER;
     const GLubyte *name = glGetString(GL_RENDERER);
     if (name != NULL) strncpy(g->renderer, (const char *)name, sizeof g->renderer - 1);
-    if (epoxy_has_gl_extension("GL_ARB_robustness")) {
-        GLint strategy = 0;
-        glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY_ARB, &strategy);
-        g->robust = strategy == GL_LOSE_CONTEXT_ON_RESET_ARB;
-    }
+    g->robust = rgl_program_sees_resets();
     while (glGetError() != GL_NO_ERROR) {
     }
     glGenVertexArrays(1, &g->arena_vao);
     g->octants = make_octants_texture();
     rgl_canvas_init(&g->canvas);
+    return true;
+}
+
+static bool gl_restart(rgl *gl, mospt_err *err)
+{
+    gl_rgl *g = (gl_rgl *)gl;
+    *g = (gl_rgl){.base = g->base}; /* its names mean nothing here */
+    return begin(g, err);
+}
+
+static const rgl_driver GL_DRIVER = {
+    .destroy = gl_destroy,
+    .renderer = gl_renderer,
+    .arena_create = gl_arena_create,
+    .arena_upload = gl_arena_upload,
+    .draw = gl_draw,
+    .read_pixels = gl_read_pixels,
+    .read_depth = gl_read_depth,
+    .read_depths = gl_read_depths,
+    .restart = gl_restart,
+};
+
+bool rgl_gl_create(rgl **out, mospt_err *err)
+{
+    gl_rgl *g = calloc(1, sizeof *g);
+    if (g == NULL) return mospt_err_nomem(err, sizeof *g);
+    g->base.driver = &GL_DRIVER;
+    if (!begin(g, err)) return free(g), false;
     *out = &g->base;
     return true;
 }

@@ -34,10 +34,15 @@ static bool has_room(const null_rgl *n, uint64_t vertices, mospt_err *err)
            mospt_err_set(err, MOSPT_ENOMEM, mospt_nowhere(), "the null backend is full");
 }
 
+static bool is_healthy(null_rgl *n, mospt_err *err)
+{
+    return !n->base.pretends || rgl_set_lost(&n->base, err);
+}
+
 static bool null_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     null_rgl *n = (null_rgl *)gl;
-    if (!has_room(n, vertex_count, err)) return false;
+    if (!is_healthy(n, err) || !has_room(n, vertex_count, err)) return false;
     mospt_vertex *arena = calloc(vertex_count + 1, sizeof *arena);
     if (arena == NULL) return mospt_err_nomem(err, vertex_count * sizeof *arena);
     free(n->arena);
@@ -49,7 +54,7 @@ static bool null_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *verti
                               mospt_err *err)
 {
     null_rgl *n = (null_rgl *)gl;
-    if (!has_room(n, n->size, err)) return false;
+    if (!is_healthy(n, err) || !has_room(n, n->size, err)) return false;
     if (first > n->size || count > n->size - first) return n->record.overruns++, true;
     memcpy(n->arena + first, vertices, count * sizeof *vertices);
     n->record.points_uploaded += count;
@@ -107,8 +112,8 @@ static void record_batch(null_rgl *n, const rend_clip *clip, const rgl_batch *ba
 static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
                       uint32_t batch_count, int parts, mospt_err *err)
 {
-    (void)err;
     null_rgl *n = (null_rgl *)gl;
+    if (!is_healthy(n, err)) return false;
     if (parts & RGL_BEGIN) {
         size_t size = 8 * sizeof *scene->octants * scene->octant_nodes;
         n->record.octants_hash = scene->octants != NULL ? mospt_hash(scene->octants, size) : 0;
@@ -130,25 +135,33 @@ static bool null_draw(rgl *gl, const rgl_scene *scene, const rgl_batch *batches,
 static bool null_read_pixels(rgl *gl, bool from_window, uint32_t width, uint32_t height,
                              uint8_t *rgb, mospt_err *err)
 {
-    (void)gl, (void)from_window, (void)err;
+    (void)from_window;
     memset(rgb, 0, (size_t)width * height * 3);
-    return true;
+    return is_healthy((null_rgl *)gl, err);
 }
 
 static bool null_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err)
 {
-    (void)x, (void)y, (void)err;
+    (void)x, (void)y;
     for (int i = 0; i < (2 * radius + 1) * (2 * radius + 1); i++)
         out[i] = ((null_rgl *)gl)->depth;
-    return true;
+    return is_healthy((null_rgl *)gl, err);
 }
 
 static bool null_read_depths(rgl *gl, float *out, mospt_err *err)
 {
-    (void)err;
     null_rgl *n = (null_rgl *)gl;
     for (uint64_t i = 0; i < n->pixels; i++)
         out[i] = n->depth;
+    return is_healthy(n, err);
+}
+
+static bool null_restart(rgl *gl, mospt_err *err)
+{
+    (void)err;
+    null_rgl *n = (null_rgl *)gl;
+    free(n->arena);
+    n->arena = NULL, n->size = 0;
     return true;
 }
 
@@ -161,6 +174,7 @@ static const rgl_driver NULL_DRIVER = {
     .read_pixels = null_read_pixels,
     .read_depth = null_read_depth,
     .read_depths = null_read_depths,
+    .restart = null_restart,
 };
 
 bool rgl_null_create(rgl **out, mospt_err *err)

@@ -11,6 +11,7 @@ typedef struct {
     GLuint program, vao, texture;
     GLint picture, height;
     uint32_t texture_width, texture_height; /* pixels; 0: none yet */
+    bool robust;                            /* the context tells when it is lost */
 } present_rgl;
 
 static present_rgl *of(rgl *gl)
@@ -62,6 +63,13 @@ static void upload_picture(present_rgl *p, uint32_t width, uint32_t height)
     p->texture_width = width, p->texture_height = height;
 }
 
+/* A reset is found at the end of a frame: until then calls do nothing. */
+static bool is_reset(const present_rgl *p, GLenum error)
+{
+    return p->base.pretends || error == GL_CONTEXT_LOST ||
+           (p->robust && glGetGraphicsResetStatusARB() != GL_NO_ERROR);
+}
+
 static bool show(present_rgl *p, uint32_t width, uint32_t height, mospt_err *err)
 {
     upload_picture(p, width, height);
@@ -75,6 +83,7 @@ static bool show(present_rgl *p, uint32_t width, uint32_t height, mospt_err *err
     GL(glBindVertexArray(p->vao));
     GL(glDrawArrays(GL_TRIANGLES, 0, 3));
     GLenum error = glGetError();
+    if (is_reset(p, error)) return rgl_set_lost(&p->base, err);
     return error == GL_NO_ERROR ||
            mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
                          "the graphics driver reports error 0x%04x at showing a picture", error);
@@ -106,6 +115,29 @@ static bool present_read_depths(rgl *gl, float *out, mospt_err *err)
     return rgl_read_depths(of(gl)->inner, out, err);
 }
 
+static bool begin(present_rgl *p, mospt_err *err)
+{
+    if (!rgl_program_create("", RGL_SCREEN_VERTEX, RGL_PRESENT_FRAGMENT, &p->program, err))
+        return false;
+    p->picture = glGetUniformLocation(p->program, "picture");
+    p->height = glGetUniformLocation(p->program, "height");
+    p->robust = rgl_program_sees_resets();
+    GL(glGenVertexArrays(1, &p->vao));
+    GL(glGenTextures(1, &p->texture));
+    GL(glBindTexture(GL_TEXTURE_2D, p->texture));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
+    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
+    return true;
+}
+
+/* What draws needs no context, and has lost nothing. */
+static bool present_restart(rgl *gl, mospt_err *err)
+{
+    present_rgl *p = of(gl);
+    *p = (present_rgl){.base = p->base, .inner = p->inner, .picture_of = p->picture_of};
+    return begin(p, err);
+}
+
 static const rgl_driver PRESENT_DRIVER = {
     .destroy = present_destroy,
     .renderer = present_renderer,
@@ -115,6 +147,7 @@ static const rgl_driver PRESENT_DRIVER = {
     .read_pixels = present_read_pixels,
     .read_depth = present_read_depth,
     .read_depths = present_read_depths,
+    .restart = present_restart,
 };
 
 bool rgl_present_create(rgl *inner, rgl_picture_of *picture_of, rgl **out, mospt_err *err)
@@ -123,17 +156,7 @@ bool rgl_present_create(rgl *inner, rgl_picture_of *picture_of, rgl **out, mospt
     if (p == NULL) return mospt_err_nomem(err, sizeof *p);
     p->base.driver = &PRESENT_DRIVER;
     p->picture_of = picture_of;
-    if (!rgl_program_create("", RGL_SCREEN_VERTEX, RGL_PRESENT_FRAGMENT, &p->program, err)) {
-        present_destroy(&p->base);
-        return false;
-    }
-    p->picture = glGetUniformLocation(p->program, "picture");
-    p->height = glGetUniformLocation(p->program, "height");
-    GL(glGenVertexArrays(1, &p->vao));
-    GL(glGenTextures(1, &p->texture));
-    GL(glBindTexture(GL_TEXTURE_2D, p->texture));
-    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST));
-    GL(glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST));
+    if (!begin(p, err)) return free(p), false;
     p->inner = inner;
     *out = &p->base;
     return true;

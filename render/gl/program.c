@@ -62,3 +62,11 @@ bool rgl_program_create(const char *defines, const char *vertex, const char *fra
     *out = program;
     return true;
 }
+
+bool rgl_program_sees_resets(void)
+{
+    GLint strategy = 0;
+    if (!epoxy_has_gl_extension("GL_ARB_robustness")) return false;
+    glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY_ARB, &strategy);
+    return strategy == GL_LOSE_CONTEXT_ON_RESET_ARB;
+}

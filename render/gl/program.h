@@ -10,6 +10,9 @@
 bool rgl_program_create(const char *defines, const char *vertex, const char *fragment, GLuint *out,
                         mospt_err *err);
 
+/* True if the context tells of the graphics driver's resets (glGetGraphicsResetStatusARB). */
+bool rgl_program_sees_resets(void);
+
 extern const char RGL_POINTS_VERTEX[], RGL_POINTS_FRAGMENT[];
 extern const char RGL_SCREEN_VERTEX[], RGL_RESOLVE_FRAGMENT[], RGL_FILL_FRAGMENT[],
     RGL_BACKGROUND_FRAGMENT[], RGL_SHADE_FRAGMENT[], RGL_PRESENT_FRAGMENT[];

@@ -1,5 +1,10 @@
 #include "render/gl/driver.h"
 
+#include <errno.h>
+#include <time.h>
+
+enum { RENEW_MAX = 20, RENEW_PAUSE_NS = 250000000 };
+
 void rgl_destroy(rgl *gl)
 {
     if (gl != NULL) gl->driver->destroy(gl);
@@ -45,4 +50,39 @@ bool rgl_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *er
 bool rgl_read_depths(rgl *gl, float *out, mospt_err *err)
 {
     return gl->driver->read_depths(gl, out, err);
+}
+
+void rgl_set_renew(rgl *gl, rgl_renew *renew, void *user)
+{
+    gl->renew = renew, gl->user = user;
+}
+
+bool rgl_is_lost(const rgl *gl)
+{
+    return gl->is_lost;
+}
+
+bool rgl_set_lost(rgl *gl, mospt_err *err)
+{
+    gl->is_lost = true;
+    errno = 0;
+    return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
+                         "the graphics driver was reset; the dataset is unharmed, start again");
+}
+
+bool rgl_recover(rgl *gl, mospt_err *err)
+{
+    const struct timespec pause = {.tv_nsec = RENEW_PAUSE_NS};
+    if (gl->renew == NULL) return rgl_set_lost(gl, err);
+    for (int i = 0; !gl->renew(gl->user, err); i++) {
+        if (i == RENEW_MAX) return false;
+        nanosleep(&pause, NULL);
+    }
+    gl->is_lost = gl->pretends = false;
+    return gl->driver->restart == NULL || gl->driver->restart(gl, err);
+}
+
+void rgl_pretend_reset(rgl *gl)
+{
+    gl->pretends = true;
 }

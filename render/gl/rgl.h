@@ -131,6 +131,24 @@ void rgl_destroy(rgl *gl);
 /* Name of the driver, for people. */
 const char *rgl_renderer(const rgl *gl);
 
+/* Makes another context current, in the place of one that is lost. */
+typedef bool rgl_renew(void *user, mospt_err *err);
+
+/* Says who is to be asked for another context; NULL: nobody. */
+void rgl_set_renew(rgl *gl, rgl_renew *renew, void *user);
+
+/* True since a call has failed because the graphics driver was reset (the card hung, or the driver
+ * was replaced): whatever was in the context is gone, and every other call will fail. */
+bool rgl_is_lost(const rgl *gl);
+
+/* After that: goes on in another context, without an arena. A driver that is not back yet is given
+ * a few seconds.
+ * errors   MOSPT_EIO: there is no other context; MOSPT_ENOMEM */
+bool rgl_recover(rgl *gl, mospt_err *err);
+
+/* For tests: from now on it is as if the driver had been reset. */
+void rgl_pretend_reset(rgl *gl);
+
 /* Makes the arena, or replaces it; contents are undefined.
  * errors   MOSPT_ENOMEM: the GPU has no room for so many */
 bool rgl_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err);

@@ -42,6 +42,11 @@ bool rgl_window_create(const char *title, uint32_t width, uint32_t height, rgl_w
                        mospt_err *err);
 void rgl_window_destroy(rgl_window *window);
 
+/* Opens another window in the place of this one, whose context is lost, and makes the new context
+ * current.
+ * errors   MOSPT_EINVAL: none can be opened; the one before is still there */
+bool rgl_window_renew(rgl_window *window, mospt_err *err);
+
 /* Waits for something to happen: 0 looks only, below 0 waits for ever. */
 void rgl_window_wait(rgl_window *window, double seconds);
 

@@ -9,6 +9,7 @@ enum { EVENTS_MAX = 256 };
 
 struct rgl_window {
     GLFWwindow *glfw;
+    char *title;                  /* owned */
     rgl_event events[EVENTS_MAX]; /* a ring; when it is full, the newest moves of the cursor are
                                      dropped first */
     uint32_t first, count;
@@ -150,6 +151,23 @@ static GLFWwindow *open_window(const char *title, uint32_t width, uint32_t heigh
     return glfwCreateWindow((int)width, (int)height, title, NULL, NULL);
 }
 
+static bool take_window(rgl_window *w, uint32_t width, uint32_t height, mospt_err *err)
+{
+    const char *why = NULL;
+    GLFWwindow *window = open_window(w->title, width, height);
+    if (window == NULL) {
+        glfwGetError(&why);
+        return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
+                             "no window with OpenGL 3.3 can be opened here (%s)",
+                             why != NULL ? why : "the system gives no reason");
+    }
+    w->glfw = window;
+    set_callbacks(w);
+    glfwMakeContextCurrent(window);
+    glfwSwapInterval(1);
+    return true;
+}
+
 bool rgl_window_create(const char *title, uint32_t width, uint32_t height, rgl_window **out,
                        mospt_err *err)
 {
@@ -159,21 +177,31 @@ bool rgl_window_create(const char *title, uint32_t width, uint32_t height, rgl_w
             "no display to open a window on; `instantpoints shot` renders without one");
     rgl_window *w = calloc(1, sizeof *w);
     if (w == NULL) return glfwTerminate(), mospt_err_nomem(err, sizeof *w);
-    w->glfw = open_window(title, width, height);
-    if (w->glfw == NULL) {
-        const char *why = NULL;
-        glfwGetError(&why);
-        mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                      "no window with OpenGL 3.3 can be opened here (%s)",
-                      why != NULL ? why : "the system gives no reason");
+    w->title = strdup(title);
+    bool ok = w->title != NULL || mospt_err_nomem(err, strlen(title));
+    if (!ok || !take_window(w, width, height, err)) {
         glfwTerminate();
+        free(w->title);
         free(w);
         return false;
     }
-    set_callbacks(w);
-    glfwMakeContextCurrent(w->glfw);
-    glfwSwapInterval(1);
     *out = w;
+    return true;
+}
+
+/* A window that fills the screen is made as it was before it did. */
+bool rgl_window_renew(rgl_window *window, mospt_err *err)
+{
+    GLFWwindow *before = window->glfw;
+    bool fills = glfwGetWindowMonitor(before) != NULL;
+    int *place = window->windowed;
+    if (!fills) glfwGetWindowPos(before, &place[0], &place[1]);
+    if (!fills) glfwGetWindowSize(before, &place[2], &place[3]);
+    if (!take_window(window, (uint32_t)place[2], (uint32_t)place[3], err)) return false;
+    glfwDestroyWindow(before);
+    if (fills) rgl_window_toggle_fullscreen(window);
+    else glfwSetWindowPos(window->glfw, place[0], place[1]);
+    on_refresh(window->glfw);
     return true;
 }
 
@@ -182,6 +210,7 @@ void rgl_window_destroy(rgl_window *window)
     if (window == NULL) return;
     glfwDestroyWindow(window->glfw);
     glfwTerminate();
+    free(window->title);
     free(window);
 }
 
