@@ -947,3 +947,8 @@ const rend_frame *rend_stage_last_frame(const rend_stage *stage)
 {
     return &stage->frame;
 }
+
+const rend_selection *rend_stage_last_selection(const rend_stage *stage)
+{
+    return stage->selection;
+}

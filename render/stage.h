@@ -111,3 +111,6 @@ const rend_legend *rend_stage_legend(const rend_stage *stage);
 
 /* The frame that was drawn last: to find out what is under the cursor. */
 const rend_frame *rend_stage_last_frame(const rend_stage *stage);
+
+/* What it drew. */
+const rend_selection *rend_stage_last_selection(const rend_stage *stage);

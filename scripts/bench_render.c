@@ -14,7 +14,8 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { SHARES = 6, BUDGETS = 5, SAMPLES = 8, REPEATS = 3 };
+enum { SHARES = 6, BUDGETS = 5, IN_A_ROW = 10, PAUSE_US = 50000 };
+#define COLD_SIZE ((size_t)64 << 20) /* more than a processor's caches hold */
 static const double SHARE[SHARES] = {0.01, 0.02, 0.05, 0.1, 0.25, 0.5};
 
 typedef struct {
@@ -136,154 +137,208 @@ static bool finish(rgl *gl, mospt_err *err)
 
 /* ---- speed ---- */
 
+/* One of our frames, and what its points take if they are drawn as they are. */
 typedef struct {
-    double points, one_ms, many_ms, plain_ms; /* of the raw limits */
-} limits_of;
+    rend_frame frame;
+    rend_selection drawn; /* with draws of its own */
+    double ours_ms, one_ms, many_ms, plain_ms;
+} flown_frame;
 
-static bool time_raw(bench *b, const rend_frame *frame, const int32_t *first, const int32_t *count,
-                     uint32_t ranges, double *sum_ms, mospt_err *err)
+/* What limits are drawn from. */
+typedef struct {
+    mospt_vertex *vertices; /* [budget] */
+    int32_t *first, *count; /* [nodes] */
+    uint8_t *other;         /* [COLD_SIZE], to have nothing in the processor's caches */
+} room;
+
+static void room_fini(room *r)
 {
-    double best = 1e30;
-    for (int k = 0; k < REPEATS; k++) {
-        double start = now_ms();
-        if (!draw_raw(b, frame, NULL, first, count, ranges, err) || !finish(b->raw, err))
-            return false;
-        best = fmin(best, now_ms() - start);
-    }
-    *sum_ms += best;
+    free(r->vertices), free(r->first), free(r->count), free(r->other);
+}
+
+static bool room_init(const bench *b, room *r, mospt_err *err)
+{
+    uint64_t most = b->o->budget_points < b->points.count ? b->o->budget_points : b->points.count;
+    uint32_t nodes = b->dataset->hierarchy.count;
+    *r = (room){.vertices = malloc((most + 1) * sizeof *r->vertices),
+                .first = calloc(nodes + 1, sizeof *r->first),
+                .count = calloc(nodes + 1, sizeof *r->count),
+                .other = malloc(COLD_SIZE)};
+    return ((r->vertices != NULL && r->first != NULL && r->count != NULL && r->other != NULL) ||
+            mospt_err_nomem(err, most * sizeof *r->vertices)) &&
+           rgl_arena_create(b->raw, most + 1, err);
+}
+
+/* Vertices that were just put together would be at hand, ours were not. */
+static void cool(room *r)
+{
+    memset(r->other, r->other[COLD_SIZE / 2] + 1, COLD_SIZE);
+}
+
+static bool time_raw(bench *b, const flown_frame *f, room *r, bool many, double *ms, mospt_err *err)
+{
+    int32_t whole = 0, points = (int32_t)f->drawn.points;
+    cool(r);
+    double start = now_ms();
+    if (!draw_raw(b, &f->frame, NULL, many ? r->first : &whole, many ? r->count : &points,
+                  many ? f->drawn.draw_count : 1, err) ||
+        !finish(b->raw, err))
+        return false;
+    *ms = now_ms() - start;
     return true;
 }
 
-static bool add_limits(bench *b, const rend_frame *frame, const rend_selection *s,
-                       mospt_vertex *vertices, limits_of *out, mospt_err *err)
+/* turn     which is drawn first */
+static bool time_limits(bench *b, room *r, uint32_t turn, flown_frame *f, mospt_err *err)
 {
-    int32_t whole = 0, points = (int32_t)s->points;
-    int32_t *first = malloc((s->draw_count + 1) * sizeof *first),
-            *count = malloc((s->draw_count + 1) * sizeof *count);
-    bool ok = (first != NULL && count != NULL) || mospt_err_nomem(err, s->draw_count);
-    for (uint32_t i = 0, at = 0; ok && i < s->draw_count; at += s->draws[i++].count)
-        first[i] = (int32_t)at, count[i] = (int32_t)s->draws[i].count;
-    bench_points_gather(&b->points, s, vertices);
-    ok = ok && rgl_arena_upload(b->raw, 0, vertices, (uint32_t)points, err) &&
-         time_raw(b, frame, &whole, &points, 1, &out->one_ms, err) &&
-         time_raw(b, frame, first, count, s->draw_count, &out->many_ms, err);
-    double best = 1e30;
-    for (int k = 0; k < REPEATS && ok; k++) {
-        double start = now_ms();
-        plain_loop_draw(b->loop, frame, vertices, (uint32_t)points);
-        best = fmin(best, now_ms() - start);
+    const rend_selection *s = &f->drawn;
+    for (uint32_t i = 0, at = 0; i < s->draw_count; at += s->draws[i++].count)
+        r->first[i] = (int32_t)at, r->count[i] = (int32_t)s->draws[i].count;
+    bench_points_gather(&b->points, s, r->vertices);
+    bool ok =
+        rgl_arena_upload(b->raw, 0, r->vertices, (uint32_t)s->points, err) && finish(b->raw, err);
+    for (uint32_t k = 0; k < 2 && ok; k++) {
+        bool many = (turn + k) % 2 > 0;
+        ok = time_raw(b, f, r, many, many ? &f->many_ms : &f->one_ms, err);
     }
-    out->plain_ms += best;
-    out->points += (double)s->points;
-    free(first), free(count);
-    return ok;
-}
-
-/* The same points as ours in a buffer, at some places of the flight. */
-static bool find_limits(bench *b, limits_of *out, mospt_err *err)
-{
-    uint32_t low[3], high[3];
-    uint64_t most = b->o->budget_points < b->points.count ? b->o->budget_points : b->points.count;
-    mospt_vertex *vertices = malloc(most * sizeof *vertices);
-    bool ok = vertices != NULL || mospt_err_nomem(err, most * sizeof *vertices);
-    *out = (limits_of){0};
-    rend_frame_bounds(b->dataset, low, high);
-    ok = ok && rgl_arena_create(b->raw, most, err);
-    for (int i = 0; i < SAMPLES && ok; i++) {
-        rend_frame frame;
-        const rend_selection *s;
-        rend_camera camera = camera_at(b, (i + 0.5) / SAMPLES, 0);
-        const mospt_grid *grid = &b->dataset->metadata.grid;
-        rend_frame_make(&camera, grid, low, high, b->o->width, b->o->height, &frame);
-        const rend_select_input input = {.hierarchy = &b->dataset->hierarchy,
-                                         .grid = grid,
-                                         .frame = &frame,
-                                         .budget_points = b->o->budget_points,
-                                         .cell_px = b->o->cell_px};
-        ok = rend_select_run(b->selector, &input, &s, err) &&
-             add_limits(b, &frame, s, vertices, out, err);
-    }
-    free(vertices);
+    cool(r);
+    double start = now_ms();
+    plain_loop_draw(b->loop, &f->frame, r->vertices, (uint32_t)s->points);
+    f->plain_ms = now_ms() - start;
     return ok;
 }
 
 typedef struct {
     double points, ms, median_ms, p99_ms, missing, hidden, nodes;
+    double one_ms, many_ms, plain_ms; /* of the limits, sums */
+    double median_ratio;              /* of frames: the better limit's time by ours */
     uint64_t loaded_bytes, uploaded_bytes;
 } flown;
 
-static bool fly(bench *b, rend_stage *stage, bool settle, bool no_occlusion, flown *out,
-                mospt_err *err)
+static bool sum_up(const bench *b, const flown_frame *frames, flown *out, mospt_err *err)
 {
     uint32_t n = b->o->frames;
-    double *ms = calloc(n, sizeof *ms);
+    double *ms = calloc(2 * (size_t)n, sizeof *ms), *ratio = ms + n;
+    if (ms == NULL) return mospt_err_nomem(err, n);
+    for (uint32_t i = 0; i < n; i++) {
+        ms[i] = frames[i].ours_ms;
+        out->ms += frames[i].ours_ms, out->one_ms += frames[i].one_ms;
+        out->many_ms += frames[i].many_ms, out->plain_ms += frames[i].plain_ms;
+    }
+    bool one = out->one_ms < out->many_ms;
+    for (uint32_t i = 0; i < n; i++)
+        ratio[i] = (one ? frames[i].one_ms : frames[i].many_ms) / frames[i].ours_ms;
+    qsort(ms, n, sizeof *ms, compare);
+    qsort(ratio, n, sizeof *ratio, compare);
+    out->median_ms = ms[n / 2], out->p99_ms = ms[n * 99 / 100], out->median_ratio = ratio[n / 2];
+    free(ms);
+    return true;
+}
+
+static bool remember(rend_stage *stage, double ms, flown_frame *out, mospt_err *err)
+{
+    const rend_selection *s = rend_stage_last_selection(stage);
+    *out = (flown_frame){.frame = *rend_stage_last_frame(stage), .drawn = *s, .ours_ms = ms};
+    out->drawn.draws = malloc((s->draw_count + 1) * sizeof *s->draws);
+    if (out->drawn.draws == NULL) return mospt_err_nomem(err, s->draw_count * sizeof *s->draws);
+    memcpy(out->drawn.draws, s->draws, s->draw_count * sizeof *s->draws);
+    return true;
+}
+
+/* settle   until the frame has all that it wants */
+static bool fly_frame(bench *b, rend_stage *stage, uint32_t i, bool settle, bool no_occlusion,
+                      double *ms, mospt_err *err)
+{
+    rend_progress progress;
+    rend_view_of view = view_at(b, (i + 0.5) / b->o->frames, 0, b->o->budget_points);
+    view.no_occlusion = no_occlusion;
+    do {
+        double start = now_ms();
+        if (!rend_stage_frame(stage, &view, NULL, &progress, err) || !finish(b->engine.gl, err))
+            return false;
+        *ms = now_ms() - start;
+        if (settle && progress == REND_WAITING) usleep(1000);
+    } while (settle && progress != REND_SETTLED);
+    return true;
+}
+
+static bool visit_all(bench *b, rend_stage *stage, mospt_err *err)
+{
+    double ms;
+    for (uint32_t i = 0; i < b->o->frames; i++)
+        if (!fly_frame(b, stage, i, true, true, &ms, err)) return false;
+    return true;
+}
+
+/* Frames follow each other, for a while: nobody reads for the next one while limits are drawn. */
+static bool fly(bench *b, rend_stage *stage, bool no_occlusion, flown *out, mospt_err *err)
+{
+    uint32_t n = b->o->frames;
+    flown_frame *frames = calloc(n, sizeof *frames);
     rend_figures f = {0}, before;
-    bool ok = ms != NULL || mospt_err_nomem(err, n);
+    room r = {0};
+    double ms;
+    bool ok = (frames != NULL || mospt_err_nomem(err, n)) && room_init(b, &r, err);
+    ok = ok && fly_frame(b, stage, 0, true, no_occlusion, &ms, err);
     *out = (flown){0};
     rend_stage_figures(stage, &before);
-    for (uint32_t i = 0; i < n && ok; i++) {
-        rend_progress progress = REND_AGAIN;
-        rend_view_of view = view_at(b, (i + 0.5) / n, 0, b->o->budget_points);
-        view.no_occlusion = no_occlusion;
-        do {
-            double start = now_ms();
-            ok = rend_stage_frame(stage, &view, NULL, &progress, err) && finish(b->engine.gl, err);
-            ms[i] = now_ms() - start;
-            if (settle && progress == REND_WAITING) usleep(1000);
-        } while (ok && settle && progress != REND_SETTLED);
+    for (uint32_t i = 0, limit = 0; i < n && ok; i++) {
+        cool(&r);
+        ok = fly_frame(b, stage, i, false, no_occlusion, &ms, err) &&
+             remember(stage, ms, &frames[i], err);
         rend_stage_figures(stage, &f);
-        out->points += (double)f.points_drawn, out->ms += ms[i];
+        out->points += (double)f.points_drawn;
         out->missing += f.pending, out->hidden += f.nodes_hidden, out->nodes += f.nodes_drawn;
+        if ((i + 1) % IN_A_ROW > 0 && i + 1 < n) continue;
+        usleep(PAUSE_US);
+        for (; limit <= i && ok; limit++)
+            ok = time_limits(b, &r, limit, &frames[limit], err);
     }
     out->loaded_bytes = f.loaded_bytes - before.loaded_bytes;
     out->uploaded_bytes = f.uploaded_bytes - before.uploaded_bytes;
-    if (ok) {
-        qsort(ms, n, sizeof *ms, compare);
-        out->median_ms = ms[n / 2], out->p99_ms = ms[n * 99 / 100];
-    }
-    free(ms);
+    ok = ok && sum_up(b, frames, out, err);
+    for (uint32_t i = 0; frames != NULL && i < n; i++)
+        free(frames[i].drawn.draws);
+    free(frames);
+    room_fini(&r);
     return ok;
 }
 
-static void print_flown(const char *name, const flown *f, const limits_of *l, uint32_t frames)
+static void print_flown(const char *name, const flown *f, uint32_t frames)
 {
-    double ours = f->points / f->ms * 1e-3, raw = l->points / fmin(l->one_ms, l->many_ms) * 1e-3,
-           plain = l->points / l->plain_ms * 1e-3;
-    printf("%-12s %7.1f %6.2f %6.2f %8.1f %8.1f %7.2f %7.0f %7.1f %8.1f %8.1f\n", name, ours,
-           ours / raw, ours / plain, f->median_ms, f->p99_ms, f->points / frames * 1e-6,
-           f->nodes / frames, f->missing / frames, (double)f->loaded_bytes * 1e-6,
-           (double)f->uploaded_bytes * 1e-6);
+    double points = f->points * 1e-3, raw_ms = fmin(f->one_ms, f->many_ms);
+    printf("%-12s %7.1f %6.2f %6.2f %6.2f %7.1f %7.1f %7.1f %8.1f %8.1f %7.2f %7.0f %7.1f %8.1f "
+           "%8.1f\n",
+           name, points / f->ms, raw_ms / f->ms, f->median_ratio, f->plain_ms / f->ms,
+           points / f->one_ms, points / f->many_ms, points / f->plain_ms, f->median_ms, f->p99_ms,
+           f->points / frames * 1e-6, f->nodes / frames, f->missing / frames,
+           (double)f->loaded_bytes * 1e-6, (double)f->uploaded_bytes * 1e-6);
 }
 
 /* Everything resident, then with a GPU cache of a tenth and nothing read yet. */
 static bool measure_speed(bench *b, mospt_err *err)
 {
-    limits_of l;
-    flown settled, resident, all, paging;
+    flown resident, all, paging;
     rend_stage *stage = NULL;
     uint64_t size = b->points.count * sizeof(mospt_vertex) * 5 / 4 + 64 * REND_MIB;
     uint32_t n = b->o->frames;
-    if (!find_limits(b, &l, err) || !rgl_arena_create(b->raw, 1, err)) return false;
     const rend_limits large = {.ram_cache_bytes = 1, .gpu_cache_bytes = size},
-                      small = {.gpu_cache_bytes = size / 10};
+                      small = {.gpu_cache_bytes = b->points.count * sizeof(mospt_vertex) / 10};
     bool ok = rend_stage_create(b->dataset, b->engine.gl, &large, NULL, NULL, &stage, err) &&
-              fly(b, stage, true, true, &settled, err) && fly(b, stage, false, true, &all, err) &&
-              fly(b, stage, false, false, &resident, err);
+              visit_all(b, stage, err) && fly(b, stage, true, &all, err) &&
+              (b->o->no_occlusion || fly(b, stage, false, &resident, err));
     rend_stage_destroy(stage);
     stage = NULL;
     ok = ok && rend_stage_create(b->dataset, b->engine.gl, &small, NULL, NULL, &stage, err) &&
-         fly(b, stage, false, b->o->no_occlusion, &paging, err);
+         fly(b, stage, b->o->no_occlusion, &paging, err);
     rend_stage_destroy(stage);
     if (!ok) return false;
-    printf(
-        "limits: M points/s: one draw %.1f, a draw per node %.1f, plain loop on %u threads %.1f\n",
-        l.points / l.one_ms * 1e-3, l.points / l.many_ms * 1e-3, b->o->threads,
-        l.points / l.plain_ms * 1e-3);
-    printf("%-12s %7s %6s %6s %8s %8s %7s %7s %7s %8s %8s\n", "", "M p/s", "/raw", "/plain",
-           "med ms", "p99 ms", "M pts", "nodes", "misses", "MB read", "MB up");
-    print_flown("resident", &all, &l, n);
-    if (!b->o->no_occlusion) print_flown("+ occlusion", &resident, &l, n);
-    print_flown("paging 1/10", &paging, &l, n);
+    printf("%-12s %7s %6s %6s %6s %7s %7s %7s %8s %8s %7s %7s %7s %8s %8s\n", "", "M p/s", "/raw",
+           "median", "/plain", "one", "many", "plain", "med ms", "p99 ms", "M pts", "nodes",
+           "misses", "MB read", "MB up");
+    print_flown("resident", &all, n);
+    if (!b->o->no_occlusion) print_flown("+ occlusion", &resident, n);
+    print_flown("paging 1/10", &paging, n);
     if (!b->o->no_occlusion)
         printf("occlusion: %.0f %% fewer points\n", 100 * (1 - resident.points / all.points));
     return true;
