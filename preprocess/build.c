@@ -176,7 +176,8 @@ static bool check_disks(build *b, mospt_err *err)
 {
     uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema),
              scratch = bytes + bytes / 16;
-    if (bytes < b->plan.store_memory) scratch = 0;
+    /* Of a pass, and of one in it, blocks that are not full are left, too. */
+    if (bytes + 2 * b->plan.spools_size < b->plan.store_memory) scratch = 0;
     b->result->scratch_announced = scratch + b->result->source.spool_size;
     if (b->options->announce != NULL)
         b->options->announce(b->options->context, b->points_total, b->result->scratch_announced,
@@ -421,7 +422,7 @@ static bool run(build *b, mospt_err *err)
     if (!measure(b, false, err)) return false;
     if (!make_schema(b, err)) return false;
     if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth,
-                        &b->plan, err))
+                        threads, &b->plan, err))
         return false;
     if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
     /* The page cache is left to others by what would be more than its share of it. */

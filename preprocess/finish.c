@@ -342,6 +342,22 @@ static bool finish_in_memory(const prep_pass_env *env, const prep_finish_part *p
     return !l.failed;
 }
 
+/* What comes of a large part is needed before what waits behind it: as much of that goes to the
+ * disk as the large part has there, so that its points are not written a second time. */
+static bool make_room(const prep_pass_env *env, const prep_finish_list *list, uint32_t large,
+                      mospt_err *err)
+{
+    const prep_finish_part *part = &list->parts[large];
+    size_t size = 0;
+    for (uint32_t s = 0; s < part->spool_count; s++)
+        size += prep_spool_size_on_disk(env->store, part->spools[s]);
+    for (uint32_t i = list->part_count; i-- > large + 1;)
+        for (uint32_t s = 0; s < list->parts[i].spool_count; s++)
+            if (!prep_spool_make_room(env->store, list->parts[i].spools[s], size, err))
+                return false;
+    return true;
+}
+
 /* A rejection file that is too large for memory is the input of a pass of its own. */
 static bool finish_large(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
 {
@@ -365,7 +381,8 @@ bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_e
              is_shared = !part->is_node && count >= SHARED_MIN;
         if ((!is_large && !is_shared) || find_kept(env, part) != MOSPT_NO_NODE) continue;
         if (!finish_in_memory(env, list->parts + begin, i - begin, false, err)) return false;
-        if (is_large && !finish_large(env, part, err)) return false;
+        if (is_large && (!make_room(env, list, i, err) || !finish_large(env, part, err)))
+            return false;
         if (!is_large && !finish_in_memory(env, part, 1, true, err)) return false;
         begin = i + 1;
     }

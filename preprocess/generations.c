@@ -5,9 +5,11 @@
 #include <stdlib.h>
 #include <time.h>
 
-/* The coarse levels are done soon after the first pass; then a commit comes ever later, down to one
- * a second, and never do they take more than one part in REST of a processor. */
-#define FIRST_SECONDS 0.125
+/* The coarse levels are done soon after the first pass; then each commit comes a little later after
+ * the last one, down to one a second, so that of a short build, too, most is kept when it is killed.
+ * Never do they take more than one part in REST of a processor. */
+#define FIRST_SECONDS 0.06
+#define GROWTH 1.25
 #define SECONDS_MAX 1.0
 enum { REST = 50 };
 
@@ -75,7 +77,7 @@ static void *run(void *context)
         double start = read_clock(CLOCK_THREAD_CPUTIME_ID);
         g->failed = !mospt_writer_commit_part(g->writer, g->metadata, g->build, &g->err);
         double least = REST * (read_clock(CLOCK_THREAD_CPUTIME_ID) - start);
-        interval = 2 * interval < SECONDS_MAX ? 2 * interval : SECONDS_MAX;
+        interval = GROWTH * interval < SECONDS_MAX ? GROWTH * interval : SECONDS_MAX;
         if (interval < least) interval = least;
     }
     return NULL;

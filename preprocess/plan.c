@@ -32,8 +32,17 @@ static uint64_t slice_size(size_t record_size)
     return PREP_PASS_SLICE * (2 * (record_size + 6) + 4 * (record_size + 32));
 }
 
-bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, prep_plan *out,
-                    mospt_err *err)
+/* Points of all nodes whose payloads are made at a time: a node has one in each of its finest
+ * cells, and less than the threshold more in each octant; or it is a pile. */
+static uint64_t emitted_points(uint32_t inner_depth, uint32_t threads)
+{
+    uint64_t node = UINT64_C(1) << 3 * inner_depth;
+    if (node < PREP_PILE_MAX) node = PREP_PILE_MAX;
+    return threads * (node + 8 * PREP_ADD_THRESHOLD);
+}
+
+bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, uint32_t threads,
+                    prep_plan *out, mospt_err *err)
 {
     prep_plan plan = {.levels = PREP_PASS_LEVELS_MAX};
     if (plan.levels > inner_depth) plan.levels = inner_depth;
@@ -50,6 +59,7 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
     plan.block_size = (size_t)(block < BLOCK_MIN   ? BLOCK_MIN
                                : block > BLOCK_MAX ? BLOCK_MAX
                                                    : block);
+    plan.spools_size = (size_t)(spools * plan.block_size);
     uint64_t slices = memory / 16 / slice_size(record_size);
     plan.batch_slices = (uint32_t)(slices < 1 ? 1 : slices > SLICES_MAX ? SLICES_MAX : slices);
 
@@ -57,7 +67,7 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
     while (plan.chunk_size < MOSPT_SINK_CHUNK_MAX && plan.chunk_size < memory / 1024)
         plan.chunk_size *= 2;
 
-    uint64_t taken = FIXED_SIZE + cells + spools * plan.block_size +
+    uint64_t taken = FIXED_SIZE + cells + plan.spools_size +
                      plan.batch_slices * slice_size(record_size) +
                      MOSPT_SINK_CHUNKS * plan.chunk_size;
     if (memory < (uint64_t)PREP_MEMORY_MIN_MIB << 20 || memory < taken + (taken >> 3))
@@ -70,16 +80,21 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, p
                                      ? ((taken + (taken >> 3)) >> 20) + 1
                                      : PREP_MEMORY_MIN_MIB));
     /* When rejection files are finished, a pass has given back its cells and batches. While some of
-     * their points are being solved, as many may be on their way to the disk. */
+     * their points are being solved, as many may be on their way to the disk, or so many as are in
+     * one node for each thread. */
     uint64_t share = (memory - taken) / 8,
-             given_back = cells + plan.batch_slices * slice_size(record_size);
+             given_back = cells + plan.batch_slices * slice_size(record_size),
+             finish = 4 * share + given_back, emitted = emitted_points(inner_depth, threads);
     size_t solve_size = prep_finish_size(record_size, 1),
            emit_size = prep_finish_emit_size(record_size, 1);
-    plan.solve_points = (4 * share + given_back) / (solve_size + emit_size);
+    plan.solve_points = finish / (solve_size + emit_size);
+    if (plan.solve_points > emitted)
+        plan.solve_points = (finish - emitted * emit_size) / solve_size;
     if (plan.solve_points > SOLVE_POINTS_MAX) plan.solve_points = SOLVE_POINTS_MAX;
+    if (emitted > plan.solve_points) emitted = plan.solve_points;
     plan.solve_memory = (size_t)(plan.solve_points * solve_size);
     /* The rest keeps points from going to the disk. */
-    uint64_t finish = plan.solve_points * (solve_size + emit_size);
+    finish = plan.solve_memory + emitted * emit_size;
     plan.store_memory = (size_t)(7 * share - (finish > given_back ? finish - given_back : 0));
     *out = plan;
     return true;

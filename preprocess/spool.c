@@ -245,6 +245,31 @@ size_t prep_spool_size_on_disk(const prep_store *s, const prep_spool *spool)
     return sum;
 }
 
+/* How many more blocks may stay in memory. */
+static size_t room(prep_store *s)
+{
+    pthread_mutex_lock(&s->lock);
+    size_t blocks = s->full_limit > s->full_in_memory ? s->full_limit - s->full_in_memory : 0;
+    pthread_mutex_unlock(&s->lock);
+    return blocks;
+}
+
+bool prep_spool_make_room(prep_store *s, prep_spool *spool, size_t size, mospt_err *err)
+{
+    for (uint32_t i = 0; i < spool->block_count && room(s) * s->block_size < size; i++) {
+        prep_block *block = &spool->blocks[i];
+        uint64_t slot;
+        if (block->memory == NULL || block->count >> s->block_shift == 0) continue;
+        if (!take_slot(s, &slot, err) ||
+            !mospt_file_write_at(s->fd, s->folder, slot * s->block_size, block->memory,
+                                 s->block_size, err))
+            return false;
+        release(s, block, true);
+        *block = (prep_block){.slot = slot, .count = 1u << s->block_shift};
+    }
+    return true;
+}
+
 bool prep_spool_view(prep_store *s, const prep_spool *spool, uint8_t *buffer,
                      const uint8_t **blocks, mospt_err *err)
 {

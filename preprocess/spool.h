@@ -64,6 +64,10 @@ bool prep_spool_seal(prep_store *store, prep_spool *spool, mospt_err *err);
 /* Bytes that prep_spool_view() reads from the disk into memory. */
 size_t prep_spool_size_on_disk(const prep_store *store, const prep_spool *spool);
 
+/* Moves full blocks of a sealed spool to the disk until `size` bytes of others may stay in memory,
+ * or none is left: for what is needed sooner. */
+bool prep_spool_make_room(prep_store *store, prep_spool *spool, size_t size, mospt_err *err);
+
 /* Makes all records of a sealed spool addressable, as they stand in its blocks.
  * buffer   [prep_spool_size_on_disk()]
  * blocks   out, [spool->block_count]: for mospt_records, with prep_store_block_shift(); valid until

@@ -217,6 +217,26 @@ static void memory_is_used_before_the_disk_and_given_back(void **state)
     prep_store_destroy(store);
 }
 
+static void full_blocks_make_room_for_what_is_needed_sooner(void **state)
+{
+    prep_store *store = make_store(6);
+    prep_spool later = {0}, sooner = {0};
+    mospt_err err = {0};
+    (void)state;
+    CORE_NEED(fill(store, &later, 1, 5 * BLOCK + 3, &err) && prep_spool_seal(store, &later, &err));
+    assert_int_equal(prep_store_scratch_peak(store), 0);
+    /* As many as asked for, less those that there is room for; then all that are full. */
+    CORE_NEED(prep_spool_make_room(store, &later, 2 * BLOCK * RECORD, &err));
+    assert_int_equal(prep_spool_size_on_disk(store, &later), 2 * BLOCK * RECORD);
+    CORE_NEED(fill(store, &sooner, 2, 2 * BLOCK, &err) && prep_spool_seal(store, &sooner, &err));
+    assert_int_equal(prep_spool_size_on_disk(store, &sooner), 0);
+    CORE_NEED(prep_spool_make_room(store, &later, 100 * BLOCK * RECORD, &err));
+    assert_int_equal(prep_spool_size_on_disk(store, &later), 5 * BLOCK * RECORD);
+    take_and_compare(store, &sooner, 2, 2 * BLOCK);
+    take_and_compare(store, &later, 1, 5 * BLOCK + 3);
+    prep_store_destroy(store);
+}
+
 static void the_scratch_file_has_no_name(void **state)
 {
     (void)state;
@@ -321,6 +341,7 @@ int main(void)
         cmocka_unit_test(a_view_shows_the_blocks_where_they_are),
         cmocka_unit_test(scratch_space_is_used_again),
         cmocka_unit_test(memory_is_used_before_the_disk_and_given_back),
+        cmocka_unit_test(full_blocks_make_room_for_what_is_needed_sooner),
         cmocka_unit_test(the_scratch_file_has_no_name),
         cmocka_unit_test(a_full_disk_is_an_error_and_leaves_the_spool_usable),
         cmocka_unit_test(a_folder_that_cannot_be_written_to_is_an_error),
