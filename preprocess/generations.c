@@ -6,8 +6,8 @@
 #include <time.h>
 
 /* The coarse levels are done soon after the first pass; then each commit comes a little later after
- * the last one, down to one a second, so that of a short build, too, most is kept when it is killed.
- * Never do they take more than one part in REST of a processor. */
+ * the last one, down to one a second, so that of a short build, too, most is kept when it is
+ * killed. Never do they take more than one part in REST of a processor. */
 #define FIRST_SECONDS 0.06
 #define GROWTH 1.25
 #define SECONDS_MAX 1.0
