@@ -1,29 +1,37 @@
 #include "mospt/linear.h"
 
 #include "mospt/deal.h"
+#include "mospt/wide.h"
 
 enum {
-    FEW = 64,   /* points in one cell, for a plain sort */
-    AHEAD = 64, /* keys by which the memory that they point to is asked for early */
-    STANDING_MAX = 1 + (MOSPT_CHILDREN_MAX - 1) * MOSPT_DEPTH_MAX,
+    FEW = 64, /* points in one cell, for a plain sort */
+    SIBLINGS = 8,
+    RUN = 256, /* points that stand for cells, whose parents are found at a time */
 };
 
-/* Work in progress. A point stands for the cells around it: of all depths but those that it shares
- * with the one before it. Those in cells that have not ended stand in a stack. */
+/* Work in progress, depth by depth from the finest: of each occupied cell, the point that stands
+ * for it, in Morton order. */
 typedef struct {
     const mospt_linear_input *in;
-    uint8_t *level;                /* [count] of the points that no longer stand */
+    uint32_t *cell;
+    uint32_t *place;  /* in the keys */
+    uint32_t *colour; /* room for SIBLINGS - 1 more, which may be read */
+    uint32_t standing;
+    uint8_t *level;                /* [count] of the points, by place; as far as is known yet */
     uint32_t at[MOSPT_LEVELS_MAX]; /* how many of them are in each level */
-    uint32_t place[STANDING_MAX];  /* in the keys */
-    uint32_t colour[STANDING_MAX];
-    uint32_t boundary[STANDING_MAX]; /* coarsest depth at which it is in another cell than the one
-                                        before it; they rise */
-    uint32_t top;                    /* index of the last one */
 } linear;
 
 size_t mospt_linear_work_size(uint32_t count)
 {
-    return count;
+    return (3 * (size_t)count + SIBLINGS - 1) * sizeof(uint32_t) + count;
+}
+
+static void linear_init(linear *l, const mospt_linear_input *in, uint32_t count, void *work)
+{
+    *l = (linear){.in = in, .cell = work};
+    l->place = l->cell + count;
+    l->colour = l->place + count;
+    l->level = (uint8_t *)(l->colour + count + SIBLINGS - 1);
 }
 
 static const uint8_t *record_of(const mospt_linear_input *in, uint64_t key)
@@ -109,49 +117,48 @@ static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t cou
         sort_cell(in, keys + begin[v], begin[v + 1] - begin[v], at + 1);
 }
 
-/* Coarsest depth at which two finest cells part: 1 for other octants of the node. */
-static uint32_t parting_depth(uint64_t a, uint64_t b, uint32_t depth)
-{
-    return depth - (63 - (uint32_t)__builtin_clzll(a ^ b)) / 3;
-}
-
 static uint32_t colour_of(const mospt_linear_input *in, uint64_t key)
 {
-    uint32_t colour;
-    memcpy(&colour, record_of(in, key) + offsetof(mospt_vertex, r), sizeof colour);
-    return colour;
+    mospt_vertex v = mospt_vertex_of(record_of(in, key));
+    return mospt_linear_colour(&v);
 }
 
 static int32_t channel(uint32_t colour, int c)
 {
-    uint8_t bytes[4];
-    memcpy(bytes, &colour, sizeof bytes);
-    return bytes[c];
+    return (int32_t)(colour >> 8 * c & 0xff);
 }
 
 /* Section 4.6: of the points standing for the children of a cell, the one whose colour is nearest
  * to their average; the first of several. Distances are compared as |n c - sum|^2, in integers, so
- * that every machine decides alike. Two are always at the same distance. */
-uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t n)
+ * that every machine decides alike. How many children there are no processor can foretell, so all
+ * of them, and what is behind them, are looked at.
+ * colours  [SIBLINGS], of which the first n count */
+static inline uint32_t choose(const uint32_t *colours, uint32_t n)
 {
-    int32_t sum[3] = {0}, best_distance = INT32_MAX, count = (int32_t)n;
-    uint32_t best = 0;
-    if (n <= 2) return 0;
-    for (uint32_t i = 0; i < n; i++)
-        for (int c = 0; c < 3; c++)
-            sum[c] += channel(colours[i], c);
-    for (uint32_t i = 0; i < n; i++) {
-        int32_t dr = count * channel(colours[i], 0) - sum[0],
-                dg = count * channel(colours[i], 1) - sum[1],
-                db = count * channel(colours[i], 2) - sum[2];
-        int32_t distance = dr * dr + dg * dg + db * db;
-        best = distance < best_distance ? i : best;
-        best_distance = distance < best_distance ? distance : best_distance;
+    int32_t count = (int32_t)n, sum[3] = {0}, distance[SIBLINGS] = {0}, best = INT32_MAX;
+    for (int c = 0; c < 3; c++)
+        for (uint32_t i = 0; i < SIBLINGS; i++)
+            sum[c] += i < n ? channel(colours[i], c) : 0;
+    for (int c = 0; c < 3; c++)
+        for (uint32_t i = 0; i < SIBLINGS; i++) {
+            int32_t d = count * channel(colours[i], c) - sum[c];
+            distance[i] += d * d;
+        }
+    for (int32_t i = 0; i < SIBLINGS; i++) {
+        int32_t rank = i < count ? distance[i] * SIBLINGS + i : INT32_MAX;
+        best = rank < best ? rank : best;
     }
-    return best;
+    return (uint32_t)best % SIBLINGS;
 }
 
-/* The same for any number of points in a finest cell, where 32 bits would not do. */
+uint32_t mospt_linear_choose(const uint32_t *colours, uint32_t n)
+{
+    uint32_t all[SIBLINGS] = {0};
+    memcpy(all, colours, n * sizeof *all);
+    return choose(all, n);
+}
+
+/* The same for any number of keys in a finest cell, where 32 bits would not do. */
 static uint32_t choose_key(const mospt_linear_input *in, const uint64_t *keys, uint32_t n)
 {
     int64_t sum[3] = {0}, best_distance = INT64_MAX;
@@ -171,75 +178,92 @@ static uint32_t choose_key(const mospt_linear_input *in, const uint64_t *keys, u
     return best;
 }
 
-static void settle(linear *l, uint32_t place, uint32_t level)
-{
-    l->level[place] = (uint8_t)level;
-    l->at[level]++;
-}
-
-/* Ends all cells of depth `boundary` and below: of the children of each, finest first, one goes on
- * to stand for it, and the others are settled in the level that they stood in. */
-static void end_cells(linear *l, uint32_t boundary)
-{
-    while (l->boundary[l->top] > boundary) {
-        uint32_t level = l->boundary[l->top], first = l->top;
-        do
-            first--;
-        while (l->boundary[first] == level);
-        uint32_t n = l->top - first + 1, chosen = mospt_linear_choose(l->colour + first, n);
-        for (uint32_t i = 0; i < n; i++)
-            if (i != chosen) settle(l, l->place[first + i], level);
-        l->place[first] = l->place[first + chosen];
-        l->colour[first] = l->colour[first + chosen];
-        l->top = first;
-    }
-}
-
 /* The points of one finest cell: one of them stands for it. Returns which. The order in which they
  * arrived must not show in the result, so only their bytes order them. */
 static uint32_t enter_cell(linear *l, uint64_t *keys, uint32_t begin, uint32_t end)
 {
     if (end - begin == 1) return begin;
     sort_cell(l->in, keys + begin, end - begin, 0);
-    uint32_t chosen = begin + choose_key(l->in, keys + begin, end - begin);
-    for (uint32_t i = begin; i < end; i++)
-        if (i != chosen) settle(l, i, l->in->depth + 1);
-    return chosen;
+    memset(l->level + begin, (int)l->in->depth + 1, end - begin);
+    return begin + choose_key(l->in, keys + begin, end - begin);
 }
 
-/* Gives every point its level, in one walk along the Morton order. */
-static void assign_levels(linear *l, uint64_t *keys, uint32_t count)
+static void enter_cells(linear *l, uint64_t *keys, uint32_t count)
 {
     const mospt_linear_input *in = l->in;
-    uint64_t last = 0; /* cell */
-    uint32_t asked = 0;
-    for (uint32_t a = 0, b; a < count; a = b) {
+    uint32_t mask = (UINT32_C(1) << 3 * in->depth) - 1, n = 0;
+    for (uint32_t a = 0, b; a < count; a = b, n++) {
         uint64_t cell = keys[a] >> in->cell_shift;
         for (b = a + 1; b < count && keys[b] >> in->cell_shift == cell;)
             b++;
-        uint32_t ask = count - b < AHEAD ? count : b + AHEAD;
-        for (; asked < ask; asked++)
-            __builtin_prefetch(record_of(in, keys[asked]));
-        uint32_t place = enter_cell(l, keys, a, b), boundary = 0;
-        if (a > 0) {
-            boundary = parting_depth(cell, last, in->depth);
-            end_cells(l, boundary);
-            l->top++;
-        }
-        l->place[l->top] = place;
-        l->colour[l->top] = colour_of(in, keys[place]);
-        l->boundary[l->top] = boundary;
-        last = cell;
+        l->cell[n] = (uint32_t)cell & mask;
+        l->place[n] = enter_cell(l, keys, a, b);
+        l->colour[n] = colour_of(in, keys[l->place[n]]);
     }
-    end_cells(l, 0);
-    settle(l, l->place[0], 0);
+    l->standing = n;
+    l->at[in->depth + 1] = count - n;
+}
+
+/* The first of each parent's children, and the end of the last one's. Returns how many parents. */
+static uint32_t find_parents(const uint32_t *cell, uint32_t count, uint32_t *first)
+{
+    uint32_t parents = 1;
+    first[0] = 0;
+    for (uint32_t i = 1; i < count; i++) {
+        first[parents] = i;
+        parents += (cell[i] ^ cell[i - 1]) >> 3 > 0;
+    }
+    first[parents] = count;
+    return parents;
+}
+
+/* Ends a run of cells of depth `level`, from the one at `from` on: of the points that stand for the
+ * children of a cell, one goes on to stand for it, at `*to` and after. Returns how many are done.
+ */
+MOSPT_WIDE static uint32_t end_run(linear *l, uint32_t level, uint32_t from, uint32_t *to)
+{
+    uint32_t count = l->standing - from < RUN ? l->standing - from : RUN, first[RUN + 1];
+    uint32_t parents = find_parents(l->cell + from, count, first), up = *to;
+    /* The last one may have more children. */
+    if (from + count < l->standing) count = first[--parents];
+    for (uint32_t i = from; i < from + count; i++)
+        l->level[l->place[i]] = (uint8_t)level;
+    for (uint32_t p = 0; p < parents; p++, up++) {
+        uint32_t child = from + first[p];
+        uint32_t chosen = child + choose(l->colour + child, first[p + 1] - first[p]);
+        l->cell[up] = l->cell[child] >> 3;
+        l->place[up] = l->place[chosen];
+        l->colour[up] = l->colour[chosen];
+    }
+    *to = up;
+    return count;
+}
+
+static void end_depth(linear *l, uint32_t level)
+{
+    uint32_t to = 0;
+    for (uint32_t from = 0; from < l->standing;)
+        from += end_run(l, level, from, &to);
+    l->at[level] = l->standing - to;
+    l->standing = to;
+}
+
+/* Gives every point its level: that of the last depth at which it stood for a cell. */
+static void assign_levels(linear *l, uint64_t *keys, uint32_t count)
+{
+    enter_cells(l, keys, count);
+    for (uint32_t level = l->in->depth; level > 0; level--)
+        end_depth(l, level);
+    l->level[l->place[0]] = 0;
+    l->at[0] = 1;
 }
 
 void mospt_linear_build(const mospt_linear_input *in, uint64_t *keys, uint32_t count, void *work,
                         uint32_t *order, uint32_t *level_end)
 {
-    linear l = {.in = in, .level = work};
+    linear l;
     uint32_t next[MOSPT_LEVELS_MAX][MOSPT_HANDS], dealt[MOSPT_LEVELS_MAX] = {0};
+    linear_init(&l, in, count, work);
     if (count > 0) assign_levels(&l, keys, count);
     for (uint32_t level = 0, end = 0; level < in->depth + 2; level++) {
         mospt_deal deal = mospt_deal_of(l.at[level]);

@@ -38,6 +38,12 @@ size_t mospt_linear_work_size(uint32_t count);
 void mospt_linear_build(const mospt_linear_input *input, uint64_t *keys, uint32_t count, void *work,
                         uint32_t *order, uint32_t *level_end);
 
+/* The colour of a point, as they are compared. */
+static inline uint32_t mospt_linear_colour(const mospt_vertex *v)
+{
+    return v->r | (uint32_t)v->g << 8 | (uint32_t)v->b << 16;
+}
+
 /* Which of up to eight points that stand for the children of a cell stands for the cell itself
  * (section 4.6).
  * colours  [count], in Morton order */

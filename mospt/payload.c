@@ -79,6 +79,14 @@ static uint64_t hash_block(const mospt_schema *schema, const uint8_t *vertices,
     return sum;
 }
 
+static uint64_t hash_records(const uint8_t *const *from, size_t stride, uint32_t count)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < count; i++)
+        sum += mospt_hash_records(from[i], stride, 1);
+    return sum;
+}
+
 uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
                             const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node)
 {
@@ -93,6 +101,7 @@ uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *rec
             __builtin_prefetch(from[i]); /* they lie anywhere in memory */
             __builtin_prefetch(from[i] + records->stride - 1);
         }
+        points_hash += hash_records(from, records->stride, n);
         gather(out + start * sizeof(mospt_vertex), from, 0, sizeof(mospt_vertex), n);
         for (uint32_t k = 0; k < schema->count; k++) {
             const mospt_attribute *a = &schema->at[k];
@@ -100,8 +109,6 @@ uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *rec
             gather(planes + (size_t)count * a->offset + start * size, from,
                    sizeof(mospt_vertex) + a->offset, size, n);
         }
-        /* Of what stands in the payload, while it is in the first cache. */
-        points_hash += hash_block(schema, out, planes, count, start, n);
     }
     node->count = count;
     node->codec = MOSPT_CODEC_RAW;

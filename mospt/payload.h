@@ -15,7 +15,8 @@ static inline size_t mospt_record_size(const mospt_schema *schema)
  * `node`.
  * records  vertex and row of each point, mospt_record_size() bytes
  * out      [count * mospt_record_size()]
- * returns  mospt_payload_points_hash() of what it has written */
+ * returns  the sum of the hashes of the records that were taken, in their new order: what
+ *          mospt_payload_points_hash() is of the payload */
 uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *records,
                             const uint32_t *order, uint32_t count, uint8_t *out, mospt_node *node);
 

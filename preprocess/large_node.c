@@ -139,7 +139,7 @@ static bool note_cell(large *l, cell *c, const uint8_t *payload, uint64_t points
     mospt_vertex first;
     (void)err;
     memcpy(&first, payload, sizeof first);
-    memcpy(&c->colour, &first.r, sizeof c->colour);
+    c->colour = mospt_linear_colour(&first);
     c->depth = (uint8_t)l->cut;
     l->points_hash += points_hash;
     return true;
