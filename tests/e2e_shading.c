@@ -471,6 +471,13 @@ static void after_a_reset_the_picture_is_the_same(void **unused)
     draw(&s);
     assert_memory_equal(before, s.rgb, sizeof before);
     assert_true(count_of(&s, BLACK) < PIXELS / 2);
+    /* And once more, with no context to be had, nor one there. */
+    rgl_set_renew(s.gl, NULL, NULL);
+    rgl_pretend_reset(s.gl);
+    CORE_FAILS(rgl_arena_create(s.gl, MOST, &err), MOSPT_EIO);
+    rgl_context_destroy(s.context);
+    s.context = NULL;
+    CORE_FAILS(rgl_recover(s.gl, &err), MOSPT_EIO);
     teardown(&s);
 }
 

@@ -39,9 +39,8 @@ typedef struct {
     char renderer[128];
 } gl_rgl;
 
-static void gl_destroy(rgl *gl)
+static void delete_all(gl_rgl *g)
 {
-    gl_rgl *g = (gl_rgl *)gl;
     rgl_canvas_fini(&g->canvas);
     glDeleteTextures(1, &g->octants);
     rgl_staging_fini(&g->staging);
@@ -49,7 +48,13 @@ static void gl_destroy(rgl *gl)
     glDeleteVertexArrays(1, &g->arena_vao);
     for (int k = 0; k < KIND_COUNT; k++)
         glDeleteProgram(g->points[k].name);
-    free(g);
+}
+
+/* What was in a lost context is gone, and perhaps no other is current. */
+static void gl_destroy(rgl *gl)
+{
+    if (!gl->is_lost) delete_all((gl_rgl *)gl);
+    free(gl);
 }
 
 static const char *gl_renderer(const rgl *gl)

@@ -22,9 +22,11 @@ static present_rgl *of(rgl *gl)
 static void present_destroy(rgl *gl)
 {
     rgl_destroy(of(gl)->inner);
-    glDeleteTextures(1, &of(gl)->texture);
-    glDeleteVertexArrays(1, &of(gl)->vao);
-    glDeleteProgram(of(gl)->program);
+    if (!gl->is_lost) { /* else they are gone */
+        glDeleteTextures(1, &of(gl)->texture);
+        glDeleteVertexArrays(1, &of(gl)->vao);
+        glDeleteProgram(of(gl)->program);
+    }
     free(gl);
 }
 
