@@ -22,7 +22,9 @@ static bool make_path(const cli_options *o, const mospt_dataset *dataset, rend_p
     const uint32_t width = o->width > 0 ? o->width : REND_WIDTH_DEFAULT,
                    height = o->height > 0 ? o->height : REND_HEIGHT_DEFAULT;
     if (o->camera_path != NULL) return rend_path_read(o->camera_path, out, err);
-    if (o->film.orbit) return rend_tour_orbit(dataset, (double)width / height, out, err);
+    if (o->film.orbit)
+        return rend_tour_orbit(dataset, (double)width / height / (o->film.stereo ? 2 : 1), out,
+                               err);
     return rend_tour_walk(dataset, out, err);
 }
 
