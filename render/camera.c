@@ -1,10 +1,11 @@
 #include "render/camera.h"
 
+#include "render/outline.h"
+
 #include <cglm/cglm.h>
 #include <math.h>
 #include <stdlib.h>
 
-#define AROUND_STEPS 16
 #define FOV_DEFAULT_RAD (60 * 3.14159265358979323846 / 180)
 #define RAD_PER_DEG (3.14159265358979323846 / 180)
 
@@ -133,117 +134,35 @@ static int compare_reals(const void *a, const void *b)
     return m < n ? -1 : m > n;
 }
 
-/* A box is mostly empty; what is to fill the picture is the points. Those of the root are spread
- * over all of the site. One in a thousand may fall outside: they are what strays. */
-static bool fit_to_points(const mospt_dataset *dataset, const double low[3], const double high[3],
-                          double aspect, double fov_rad, rend_camera *out)
+/* A box is mostly empty; what is to fill the picture is the points. One in a thousand may fall
+ * outside. */
+static bool fit_to_points(const rend_outline *site, double aspect, double fov_rad, rend_camera *out,
+                          mospt_err *err)
 {
-    enum { STRAYS = 1000, FEWEST = 8 };
-    const mospt_grid *grid = &dataset->metadata.grid;
-    uint32_t count = dataset->hierarchy.nodes[0].level_end[dataset->hierarchy.inner_depth], n = 0;
-    mospt_vertex *v = malloc(mospt_dataset_vertices_size(dataset, 0));
-    double *pushed = malloc(4 * (size_t)count * sizeof *pushed), reach[4];
+    enum { STRAYS = 1000 };
+    const uint32_t n = site->count;
+    double *pushed = malloc(4 * (size_t)n * sizeof *pushed), reach[4];
+    if (pushed == NULL) return mospt_err_nomem(err, 4 * (size_t)n * sizeof *pushed);
     overview o;
-    bool ok = v != NULL && pushed != NULL && mospt_dataset_read_vertices(dataset, 0, v, NULL);
-    look_from_above(low, high, aspect, fov_rad, &o);
-    for (uint32_t i = 0; ok && i < count; i++) {
-        const uint32_t g[3] = {v[i].x, v[i].y, v[i].z};
-        double p[3], sides[4];
-        bool inside = true;
-        for (int a = 0; a < 3; a++) {
-            p[a] = mospt_grid_axis_to_world(grid, a, g[a]) - o.middle[a];
-            inside = inside && fabs(p[a]) <= o.half[a] + grid->step;
-        }
-        if (!inside) continue;
-        push_sides(&o, p, sides);
+    look_from_above(site->low, site->high, aspect, fov_rad, &o);
+    for (uint32_t i = 0; i < n; i++) {
+        double sides[4];
+        push_sides(&o, site->at[i], sides);
         for (uint32_t side = 0; side < 4; side++)
-            pushed[side * count + n] = sides[side];
-        n++;
+            pushed[side * n + i] = sides[side];
     }
-    ok = ok && n >= FEWEST;
-    for (uint32_t side = 0; ok && side < 4; side++) {
-        double *of_side = pushed + (size_t)side * count;
+    for (uint32_t side = 0; side < 4; side++) {
+        double *of_side = pushed + (size_t)side * n;
         qsort(of_side, n, sizeof *of_side, compare_reals);
         reach[side] = of_side[n - 1 - n / STRAYS];
     }
+    free(pushed);
     /* Points that all lie on one line of sight fill no picture. */
-    ok = ok && fmax(reach[0] + reach[1], reach[2] + reach[3]) >
-                   1e-3 * fmax(o.half[0], fmax(o.half[1], o.half[2]));
-    if (ok) stand_at(&o, reach, fov_rad, out);
-    free(v), free(pushed);
-    return ok;
-}
-
-enum { BINS = 1024, TRIM_ROUNDS = 12 };
-
-/* Adds a node's points to the bins of one axis, spread evenly over its cube. */
-static void spread(const mospt_grid *grid, const mospt_node *node, int axis, double low,
-                   double bin_width, double bins[BINS])
-{
-    double from = ((double)node->corner[axis] - low) / bin_width;
-    double width = (double)mospt_cell_width(grid, node->level) / bin_width;
-    int first = (int)fmax(floor(from), 0), last = (int)fmin(floor(from + width), BINS - 1);
-    for (int b = first; b <= last; b++)
-        bins[b] += node->count / (double)(last - first + 1);
-}
-
-/* Fills the bins of one axis; returns how many points are in them. Only nodes that are small
- * against the range say where points are; those of the upper levels are spread over all of it. */
-static double fill_bins(const mospt_dataset *dataset, int axis, double low, double high,
-                        double bins[BINS])
-{
-    const mospt_hierarchy *h = &dataset->hierarchy;
-    double sum = 0;
-    memset(bins, 0, BINS * sizeof *bins);
-    for (uint32_t n = 0; n < h->count; n++) {
-        if ((double)mospt_cell_width(&dataset->metadata.grid, h->nodes[n].level) >
-            (high - low) / 16)
-            continue;
-        spread(&dataset->metadata.grid, &h->nodes[n], axis, low, (high - low) / BINS, bins);
-        sum += h->nodes[n].count;
-    }
-    return sum;
-}
-
-/* The bins left when those at both ends are cut off that hold less than `share` of the points. */
-static void trim_bins(const double bins[BINS], double share, int *first, int *last)
-{
-    *first = 0, *last = BINS - 1;
-    for (double below = bins[0]; below < share && *first < *last; below += bins[*first])
-        ++*first;
-    for (double above = bins[*last]; above < share && *first < *last; above += bins[*last])
-        --*last;
-}
-
-/* One round of trimming along one axis. */
-static bool trim_axis(const mospt_dataset *dataset, int axis, double *low, double *high)
-{
-    double bins[BINS], bin_width = (*high - *low) / BINS;
-    int first, last;
-    if (!(bin_width > 1)) return false;
-    double sum = fill_bins(dataset, axis, *low, *high, bins);
-    if (sum < 0.8 * (double)dataset->hierarchy.point_count) return false;
-    trim_bins(bins, 1e-3 * sum, &first, &last);
-    /* A few metres less are no reason: an overview shows all of a site that has no outliers. */
-    if (last + 1 - first > BINS / 2) return false;
-    *high = *low + bin_width * (last + 1);
-    *low += bin_width * first;
+    if (fmax(reach[0] + reach[1], reach[2] + reach[3]) >
+        1e-3 * fmax(o.half[0], fmax(o.half[1], o.half[2])))
+        stand_at(&o, reach, fov_rad, out);
+    else rend_camera_overview(site->low, site->high, aspect, fov_rad, out);
     return true;
-}
-
-void rend_camera_bounds(const mospt_dataset *dataset, double low[3], double high[3])
-{
-    const mospt_grid *grid = &dataset->metadata.grid;
-    uint32_t box_low[3], box_high[3];
-    rend_frame_bounds(dataset, box_low, box_high);
-    for (int a = 0; a < 3; a++) {
-        double from = box_low[a], to = (double)box_high[a];
-        bool again = true;
-        for (int round = 0; again && round < TRIM_ROUNDS; round++)
-            again = trim_axis(dataset, a, &from, &to);
-        low[a] = mospt_grid_axis_to_world(grid, a, (uint32_t)from);
-        high[a] = mospt_grid_axis_to_world(grid, a, (uint32_t)fmin(ceil(to), UINT32_MAX));
-    }
 }
 
 static bool finite3(const double v[3])
@@ -284,23 +203,13 @@ bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *d
                              "a field of view of %g degrees is not between 1 and 170",
                              options->fov_deg);
     rend_camera camera;
-    double low[3], high[3], middle[3];
-    rend_camera_bounds(dataset, low, high);
-    /* A single position has no size of its own: look at some steps around it. */
-    if (low[0] == high[0] && low[1] == high[1] && low[2] == high[2]) {
-        double around = AROUND_STEPS * dataset->metadata.grid.step;
-        for (int a = 0; a < 3; a++)
-            around = fmax(around, 1e-6 * fabs(low[a]));
-        for (int a = 0; a < 3; a++)
-            low[a] -= around, high[a] += around;
-    }
-    for (int a = 0; a < 3; a++)
-        middle[a] = low[a] + 0.5 * (high[a] - low[a]);
-    double aspect = (double)width / height;
+    rend_outline site;
+    if (!rend_outline_make(dataset, &site, err)) return false;
     double fov_rad = options->has_fov ? options->fov_deg * RAD_PER_DEG : FOV_DEFAULT_RAD;
-    if (!fit_to_points(dataset, low, high, aspect, fov_rad, &camera))
-        rend_camera_overview(low, high, aspect, fov_rad, &camera);
-    override(options, middle, &camera);
+    bool ok = fit_to_points(&site, (double)width / height, fov_rad, &camera, err);
+    if (ok) override(options, site.middle, &camera);
+    rend_outline_fini(&site);
+    if (!ok) return false;
     if (camera.eye[0] == camera.target[0] && camera.eye[1] == camera.target[1] &&
         camera.eye[2] == camera.target[2])
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),

@@ -52,10 +52,6 @@ typedef struct {
 void rend_camera_overview(const double low[3], const double high[3], double aspect, double fov_rad,
                           rend_camera *out);
 
-/* Bounds of a dataset without the few points that lie far away from all others: what an overview
- * should show. */
-void rend_camera_bounds(const mospt_dataset *dataset, double low[3], double high[3]);
-
 /* The camera that the options ask for.
  * errors   MOSPT_EINVAL: not finite, eye on the target, a field of view out of range */
 bool rend_camera_make(const rend_camera_options *options, const mospt_dataset *dataset,

@@ -1,5 +1,6 @@
 #include "render/tour.h"
 
+#include "render/outline.h"
 #include "render/space.h"
 
 #include <math.h>
@@ -27,74 +28,110 @@ static double distance3(const double a[3], const double b[3])
 
 /* ---- around ---- */
 
-static void turn_about(const double middle[3], const double from[3], double turn, double to[3])
-{
-    double x = from[0] - middle[0], y = from[1] - middle[1];
-    to[0] = middle[0] + x * cos(turn) - y * sin(turn);
-    to[1] = middle[1] + x * sin(turn) + y * cos(turn);
-    to[2] = from[2];
-}
+/* A circle that the eye moves on, looking at its target from a fixed height. */
+typedef struct {
+    double centre[3]; /* the target, metres from the middle of the outline */
+    double eye_m;     /* from the target */
+    double tx, ty;    /* tangents of half the field of view, less a margin */
+} circle;
 
-/* True if no corner of the site is outside of the picture. */
-static bool shows_all(const rend_camera *camera, const double low[3], const double high[3],
-                      double aspect)
+enum { AROUND_STEPS = 19, ROUNDS = 8, OUTLINE_MOST = 1 << 14, OUTSIDE = 1000 };
+#define PITCH_RAD (34 * PI / 180)
+
+/* The centre of the smallest circle around the site (Badoiu and Clarkson 2003). */
+static void find_axis(const rend_outline *site, circle *c)
 {
-    double right[3], up[3], back[3], t = tan(0.5 * camera->fov_rad);
-    rend_camera_axes(camera, right, up, back);
-    for (int corner = 0; corner < 8; corner++) {
-        double x = 0, y = 0, z = 0;
-        for (int a = 0; a < 3; a++) {
-            double d = ((corner >> a & 1) ? high[a] : low[a]) - camera->eye[a];
-            x += d * right[a], y += d * up[a], z -= d * back[a];
+    enum { STEPS = 200 };
+    for (int i = 1; i <= STEPS; i++) {
+        const double *farthest = site->at[0];
+        double most = -1;
+        for (uint32_t p = 0; p < site->count; p++) {
+            double x = site->at[p][0] - c->centre[0], y = site->at[p][1] - c->centre[1];
+            if (x * x + y * y > most) most = x * x + y * y, farthest = site->at[p];
         }
-        if (!(z > 0 && fabs(x) <= t * aspect * z && fabs(y) <= t * z)) return false;
+        c->centre[0] += (farthest[0] - c->centre[0]) / (i + 1);
+        c->centre[1] += (farthest[1] - c->centre[1]) / (i + 1);
     }
-    return true;
 }
 
-/* Around a square of so many metres; `fits` tells whether the site stays in the picture. */
-static bool circle(const double low[3], const double high[3], double side, double aspect,
-                   rend_path *path, bool *fits, mospt_err *err)
+/* How far away the eye must be for a point to stay in the picture all the way around, and how far
+ * up and down in the picture it comes, as tangents. */
+static void follow(const circle *c, const double p[3], double *eye_m, double *top, double *bottom)
 {
-    double middle[3], square_low[3], square_high[3];
-    rend_camera view;
-    for (int a = 0; a < 3; a++) {
-        middle[a] = low[a] + 0.5 * (high[a] - low[a]);
-        square_low[a] = a < 2 ? middle[a] - 0.5 * side : low[a];
-        square_high[a] = a < 2 ? middle[a] + 0.5 * side : high[a];
+    double r = hypot(p[0] - c->centre[0], p[1] - c->centre[1]), h = p[2] - c->centre[2];
+    *eye_m = *top = *bottom = -INFINITY;
+    for (int i = 0; i < AROUND_STEPS; i++) {
+        double turn = PI * i / (AROUND_STEPS - 1), along = r * cos(turn), x = r * sin(turn);
+        double y = h * cos(PITCH_RAD) - along * sin(PITCH_RAD),
+               z = h * sin(PITCH_RAD) + along * cos(PITCH_RAD);
+        double tangent = y / fmax(c->eye_m - z, 1e-3 * c->eye_m);
+        *eye_m = fmax(*eye_m, z + fmax(x / c->tx, fabs(y) / c->ty));
+        *top = fmax(*top, tangent);
+        *bottom = fmax(*bottom, -tangent);
     }
-    rend_camera_overview(square_low, square_high, aspect, FOV_RAD, &view);
-    *fits = true;
+}
+
+static int compare_reals(const void *a, const void *b)
+{
+    double m = *(const double *)a, n = *(const double *)b;
+    return m < n ? -1 : m > n;
+}
+
+/* Moves the eye as near as it can be, and the circle up or down until the site is in the middle of
+ * the picture. One point in a thousand may fall outside.
+ * room     [3 * OUTLINE_MOST] */
+static void fit_circle(const rend_outline *site, double *room, circle *c)
+{
+    uint32_t stride = (site->count + OUTLINE_MOST - 1) / OUTLINE_MOST, n = 0;
+    double *eye_m = room, *top = room + OUTLINE_MOST, *bottom = top + OUTLINE_MOST;
+    for (uint32_t p = 0; p < site->count; p += stride, n++)
+        follow(c, site->at[p], &eye_m[n], &top[n], &bottom[n]);
+    for (int i = 0; i < 3; i++)
+        qsort(room + (size_t)i * OUTLINE_MOST, n, sizeof *room, compare_reals);
+    uint32_t last = n - 1 - n / OUTSIDE;
+    bool first = c->eye_m == 0;
+    if (!first) c->centre[2] += 0.5 * (top[last] - bottom[last]) * c->eye_m / cos(PITCH_RAD);
+    c->eye_m = eye_m[last];
+}
+
+static bool add_circle(const rend_outline *site, const circle *c, rend_path *path, mospt_err *err)
+{
+    bool is_long = site->high[1] - site->low[1] > 1.3 * (site->high[0] - site->low[0]);
     for (int i = 0; i <= ORBIT_KEYS; i++) {
-        double turn = 2 * PI * i / ORBIT_KEYS;
+        double turn = (is_long ? -160 : -110) * PI / 180 + 2 * PI * i / ORBIT_KEYS;
+        const double back[3] = {cos(turn) * cos(PITCH_RAD), sin(turn) * cos(PITCH_RAD),
+                                sin(PITCH_RAD)};
         rend_key key = {.time_s = ORBIT_S * i / ORBIT_KEYS,
                         .camera = {.up = {0, 0, 1}, .fov_rad = FOV_RAD}};
-        turn_about(middle, view.eye, turn, key.camera.eye);
-        turn_about(middle, view.target, turn, key.camera.target);
-        *fits = *fits && shows_all(&key.camera, low, high, aspect);
+        for (int a = 0; a < 3; a++) {
+            key.camera.target[a] = site->middle[a] + c->centre[a];
+            key.camera.eye[a] = key.camera.target[a] + c->eye_m * back[a];
+        }
         if (!rend_path_add(path, &key, NULL, err)) return false;
     }
     return true;
 }
 
-/* As near as possible: from a circle around the circumscribed one everything shows. */
 bool rend_tour_orbit(const mospt_dataset *dataset, double aspect, rend_path *out, mospt_err *err)
 {
-    double low[3], high[3];
+    enum { MARGIN_PERCENT = 8 };
+    rend_outline site;
     rend_path path = {0};
-    bool fits = false;
-    rend_camera_bounds(dataset, low, high);
-    double x = high[0] - low[0], y = high[1] - low[1];
-    double nearest = fmax(fmax(x, y), 16 * dataset->metadata.grid.step);
-    for (double side = nearest; !fits && side < 2 * nearest; side *= 1.05) {
-        rend_path_fini(&path);
-        if (!circle(low, high, side, aspect, &path, &fits, err)) {
-            rend_path_fini(&path);
-            return false;
-        }
-    }
-    *out = path;
-    return true;
+    circle c = {.ty = tan(0.5 * FOV_RAD) * (1 - 0.01 * MARGIN_PERCENT)};
+    c.tx = c.ty * aspect;
+    double *room = malloc(3 * OUTLINE_MOST * sizeof *room);
+    if (room == NULL) return mospt_err_nomem(err, 3 * OUTLINE_MOST * sizeof *room);
+    if (!rend_outline_make(dataset, &site, err)) return free(room), false;
+    find_axis(&site, &c);
+    for (int i = 0; i < ROUNDS; i++)
+        fit_circle(&site, room, &c);
+    c.eye_m = fmax(c.eye_m, 16 * dataset->metadata.grid.step);
+    bool ok = add_circle(&site, &c, &path, err);
+    rend_outline_fini(&site);
+    free(room);
+    if (ok) *out = path;
+    else rend_path_fini(&path);
+    return ok;
 }
 
 /* ---- places to walk to ---- */
@@ -363,7 +400,7 @@ static rend_box part_around(const mospt_dataset *dataset, const places *stops)
             high[a] = low[a] + width;
         include(&part, low), include(&part, high);
     }
-    rend_camera_bounds(dataset, all.low, all.high);
+    rend_outline_bounds(dataset, all.low, all.high);
     for (int a = 0; a < 3; a++) {
         part.low[a] = fmax(part.low[a] - AROUND_M, all.low[a]);
         part.high[a] = fmax(fmin(part.high[a] + AROUND_M, all.high[a]), part.low[a]);

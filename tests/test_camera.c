@@ -1,4 +1,5 @@
 #include "render/camera.h"
+#include "render/outline.h"
 #include "tests/render_tools.h"
 
 #include <math.h>
@@ -176,13 +177,57 @@ static void an_outlier_does_not_spoil_the_overview(void **unused)
     core_dataset_make(&site, 4, 50, path);
     CORE_NEED(mospt_dataset_open(path, &dataset, &err));
     double low[3], high[3], width = ldexp(site.grid.step, 20);
-    rend_camera_bounds(dataset, low, high);
+    rend_outline_bounds(dataset, low, high);
     for (int a = 0; a < 3; a++)
         assert_true(high[a] - low[a] < width / 16 && high[a] - low[a] > width / 80);
     mospt_dataset_close(dataset);
     core_site_fini(&site);
     free(path);
     core_folder_remove(folder);
+}
+
+/* A site over five eighths of the cube's width, and one point of so many in its far corner. */
+static double reach_with_one_far_of(uint32_t every)
+{
+    mospt_err err = {0};
+    core_site site;
+    mospt_dataset *dataset;
+    rend_outline outline;
+    double reach = 0;
+    char *folder = core_folder_make(), *path = core_path(folder, "site.ipts");
+    core_site_make(CORE_UNIFORM, 20, 20000, 3, &site);
+    for (uint32_t i = 0; i < site.count; i++) {
+        mospt_vertex v = mospt_vertex_of(site.records + i * site.stride);
+        uint32_t *xyz[3] = {&v.x, &v.y, &v.z};
+        for (int a = 0; a < 3; a++) {
+            uint32_t at = *xyz[a] - site.grid.root[a];
+            at = i % every == 0 ? (1u << 20) - 1 - at / 20 : at / 8 * 5;
+            *xyz[a] = site.grid.root[a] + at;
+        }
+        memcpy(site.records + i * site.stride, &v, sizeof v);
+    }
+    core_dataset_make(&site, 5, 50, path);
+    CORE_NEED(mospt_dataset_open(path, &dataset, &err));
+    CORE_NEED(rend_outline_make(dataset, &outline, &err));
+    assert_true(outline.count > 1000);
+    for (uint32_t i = 0; i < outline.count; i++)
+        for (int a = 0; a < 3; a++)
+            reach = fmax(reach, outline.at[i][a] + outline.middle[a] - outline.low[a]);
+    reach /= outline.high[0] - outline.low[0];
+    rend_outline_fini(&outline);
+    mospt_dataset_close(dataset);
+    core_site_fini(&site);
+    free(path);
+    core_folder_remove(folder);
+    return reach;
+}
+
+/* What was seen through a window is not the site; a second house is. */
+static void small_islands_stray_and_large_ones_do_not(void **unused)
+{
+    (void)unused;
+    double stray = reach_with_one_far_of(200), house = reach_with_one_far_of(10);
+    assert_true(stray > 0.6 && stray < 0.65 && house > 0.98);
 }
 
 int main(void)
@@ -195,6 +240,7 @@ int main(void)
         cmocka_unit_test(depth_and_distance_are_each_others_inverse),
         cmocka_unit_test(options_that_make_no_sense_are_refused),
         cmocka_unit_test(an_outlier_does_not_spoil_the_overview),
+        cmocka_unit_test(small_islands_stray_and_large_ones_do_not),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
