@@ -12,6 +12,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <time.h>
+#include <unistd.h>
 
 enum { RATE_DEFAULT = 30, RATE_MAX = 1000 };
 
@@ -363,10 +364,24 @@ static bool can_report(const recorder *r, mospt_err *err)
            mospt_err_set(err, MOSPT_EIO, mospt_at_file(r->options.report), "cannot be written");
 }
 
+/* Before anything is made: the folder of the film is what has to be mended. */
+static bool can_write_beside(const char *output, mospt_err *err)
+{
+    char *folder = strdup(output);
+    if (folder == NULL) return mospt_err_nomem(err, strlen(output) + 1);
+    char *slash = strrchr(folder, '/');
+    if (slash != NULL) slash[slash == folder ? 1 : 0] = '\0';
+    const char *place = slash != NULL ? folder : ".";
+    bool ok = access(place, W_OK | X_OK) == 0 ||
+              mospt_err_set(err, MOSPT_EIO, mospt_at_file(place), "no film can be put here");
+    free(folder);
+    return ok;
+}
+
 static bool start(recorder *r, mospt_err *err)
 {
     if (!set_defaults(r, err) || !rend_take_fits(&r->options.take, err) || !colours_fit(r, err) ||
-        !can_report(r, err))
+        !can_write_beside(r->options.output, err) || !can_report(r, err))
         return false;
     /* The reel after what draws: pictures of two back ends do not mix. */
     return rend_curve_create(r->options.path, &r->curve, err) &&
@@ -389,6 +404,19 @@ static bool draw_all(recorder *r, mospt_err *err)
     bool written = rend_writer_finish(r->writer, &write_err);
     if (!written && err != NULL) *err = write_err; /* it came first */
     return drawn && written;
+}
+
+/* A full disk, above all: what is done is not lost. */
+static void say_that_it_goes_on(const recorder *r, mospt_err *err)
+{
+    if (err == NULL || err->code != MOSPT_EIO || r->reel == NULL || r->options.take.live) return;
+    size_t used = strlen(err->message), room = sizeof err->message - used;
+    uint64_t next = rend_reel_next(r->reel);
+    if (next == r->options.end)
+        snprintf(err->message + used, room, "; all frames are there, the same command finishes it");
+    else
+        snprintf(err->message + used, room,
+                 "; once that is mended, the same command goes on from frame %" PRIu64, next);
 }
 
 static void note_result(recorder *r)
@@ -418,6 +446,7 @@ bool rend_record(const mospt_dataset *dataset, const rend_record_options *option
     rend_writer_destroy(r.writer);
     rend_take_destroy(r.take);
     ok = ok && rend_reel_finish(r.reel, options->report, err);
+    if (!ok) say_that_it_goes_on(&r, err);
     rend_reel_close(r.reel);
     rend_curve_destroy(r.curve);
     r.result.frames = r.options.end - r.options.first;

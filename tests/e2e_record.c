@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -517,6 +518,57 @@ static void the_report_has_a_line_for_each_frame(void **unused)
     scene_fini(&s);
 }
 
+static bool full_at_eight(void *context, const rend_record_progress *now)
+{
+    struct rlimit limit = {.rlim_cur = 4096, .rlim_max = RLIM_INFINITY};
+    (void)context;
+    if (now->drawn == 8) assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    return true;
+}
+
+static void a_full_disk_says_where_it_goes_on(void **unused)
+{
+    (void)unused;
+    const struct rlimit none = {.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
+    const char *const names[] = {"a.mkv", "a.mp4", "a.png"};
+    scene s;
+    mospt_err err = {0};
+    scene_make(&s);
+    signal(SIGXFSZ, SIG_IGN);
+    for (int n = 0; n < 3; n++) {
+        rend_record_result result;
+        unsigned long long frame = 0;
+        char *path = core_path(s.site.folder, "%s", names[n]);
+        rend_record_options options = options_for(&s.path, path);
+        options.progress = full_at_eight;
+        CORE_FAILS(rend_record(s.site.dataset, &options, NULL, &err), MOSPT_EIO);
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &none), 0);
+        const char *told = strstr(err.message, "goes on from frame ");
+        assert_non_null(told);
+        assert_int_equal(sscanf(told, "goes on from frame %llu", &frame), 1);
+        options.progress = NULL;
+        CORE_NEED(rend_record(s.site.dataset, &options, &result, &err));
+        assert_true(result.resumed_at == frame);
+        free(path);
+    }
+    signal(SIGXFSZ, SIG_DFL);
+    scene_fini(&s);
+}
+
+static void a_folder_that_is_not_there_is_named(void **unused)
+{
+    (void)unused;
+    scene s;
+    mospt_err err = {0};
+    scene_make(&s);
+    char *path = core_path(s.site.folder, "none/a.mp4"), *none = core_path(s.site.folder, "none");
+    rend_record_options options = options_for(&s.path, path);
+    CORE_FAILS(rend_record(s.site.dataset, &options, NULL, &err), MOSPT_EIO);
+    assert_string_equal(err.file, none);
+    free(path), free(none);
+    scene_fini(&s);
+}
+
 static void what_makes_no_sense_is_refused(void **unused)
 {
     (void)unused;
@@ -564,6 +616,8 @@ int main(void)
         cmocka_unit_test(another_recording_does_not_go_on_with_an_unfinished_one),
         cmocka_unit_test(what_draws_and_how_belongs_to_the_recording),
         cmocka_unit_test(the_report_has_a_line_for_each_frame),
+        cmocka_unit_test(a_full_disk_says_where_it_goes_on),
+        cmocka_unit_test(a_folder_that_is_not_there_is_named),
         cmocka_unit_test(what_makes_no_sense_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
