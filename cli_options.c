@@ -34,11 +34,13 @@ static const struct {
     [CLI_VIEW] = {"view", "NAME.ipts | SCANS...", "look at a dataset, or at raw scans, in a window",
                   "Raw scans are built first, into a temporary dataset or the one that -o names. "
                   "In the window, F1 shows the keys.\n"},
-    [CLI_SHOT] = {"shot", "NAME.ipts -o PICTURE.png", "render one picture, without any display",
+    [CLI_SHOT] = {"shot", "NAME.ipts | SCANS... -o PICTURE.png",
+                  "render one picture, without any display",
                   "Without --eye and --target the picture shows all of the site. The same dataset "
                   "and options give the same bytes.\n"},
     [CLI_RECORD] =
-        {"record", "NAME.ipts -o FILM.mp4", "make a film of a camera path, without any display",
+        {"record", "NAME.ipts | SCANS... -o FILM.mp4",
+         "make a film of a camera path, without any display",
          "The name decides: .mp4 H.264, .webm VP9 or AV1, .mkv lossless FFV1, .png numbered "
          "pictures. Each frame is the\npicture that `shot` makes of it. Without --path the camera "
          "walks from scan to scan, or turns around the site.\nA recording that was interrupted "
@@ -733,13 +735,33 @@ char *cli_help(void)
             "usage: instantpoints COMMAND ...\n\n",
             IPTS_VERSION);
     for (int c = 0; c < CLI_COMMANDS; c++)
-        fprintf(f, "  %-6s %-26s %s\n", commands[c].name, commands[c].arguments,
+        fprintf(f, "  %-6s %-36s %s\n", commands[c].name, commands[c].arguments,
                 commands[c].purpose);
     fprintf(f, "\n`instantpoints help COMMAND` has the options. Exit codes: 0 done, 1 failed, 2 "
                "wrong use,\n"
                "3 done, but some input was left out (it is named).\n");
     fclose(f);
     return text;
+}
+
+/* Options that only count where a command that shows something builds a dataset first. */
+static bool is_for_building(int option, cli_command command)
+{
+    return (command == CLI_SHOT || command == CLI_RECORD) && (options[option].commands & B) != 0 &&
+           (options[option].commands & (J | C)) == 0 && options[option].read != o_threads;
+}
+
+static void print_building(FILE *f, cli_command command)
+{
+    int count = 0;
+    for (int i = 0; i < OPTION_COUNT; i++)
+        if ((options[i].commands >> command & 1) && is_for_building(i, command))
+            fprintf(f, "%s--%s",
+                    count++ > 0 ? ", "
+                                : "\nScans instead of a dataset are built first, into a temporary "
+                                  "one. For that, as with\n`instantpoints build`: ",
+                    options[i].name);
+    if (count > 0) fprintf(f, ".\n");
 }
 
 char *cli_command_help(cli_command command)
@@ -753,7 +775,9 @@ char *cli_command_help(cli_command command)
             commands[command].purpose + 1, commands[command].details);
     for (int i = 0; i < OPTION_COUNT; i++) {
         char left[64];
-        if (!(options[i].commands >> command & 1) || options[i].help == NULL) continue;
+        if (!(options[i].commands >> command & 1) || options[i].help == NULL ||
+            is_for_building(i, command))
+            continue;
         snprintf(left, sizeof left, "%c%c%s --%s%s%s", options[i].letter != 0 ? '-' : ' ',
                  options[i].letter != 0 ? options[i].letter : ' ',
                  options[i].letter != 0 ? "," : " ", options[i].name,
@@ -761,6 +785,7 @@ char *cli_command_help(cli_command command)
                  options[i].value != NULL ? options[i].value : "");
         fprintf(f, "  %-26s %s\n", left, options[i].help);
     }
+    print_building(f, command);
     fclose(f);
     return text;
 }

@@ -266,6 +266,11 @@ static void help_goes_to_standard_output(void **state)
     assert_non_null(strstr(out, "--memory"));
     assert_non_null(strstr(out, "--threads"));
     assert_null(strstr(out, "--fov"));
+    /* Options of building are named, and explained where they belong. */
+    expect("help record", DONE);
+    assert_non_null(strstr(out, "--columns"));
+    assert_null(strstr(out, "\n      --columns "));
+    assert_non_null(strstr(out, "\n      --threads "));
 }
 
 static void a_site_is_built_told_and_checked(void **state)
