@@ -3,8 +3,9 @@
  * Potree: a saved project (JSON or JSON5); its first camera animation with at least two control
  * points; without one, its view, a path of one keyframe.
  *
- * Bundler: bundle.out, version 0.3, the camera list that CloudCompare opens and photogrammetry
- * programs write; cameras without a focal length are passed over.
+ * Bundler: bundle.out, version 0.3, the camera list that photogrammetry programs write and
+ * CloudCompare opens; cameras without a focal length are passed over. CloudCompare itself writes
+ * none: it keeps viewports in its own BIN files.
  *
  * They give places and not times: a Potree animation lasts as long as it says, or else the camera
  * goes at a walking pace, and time is divided by the length of the way. */
