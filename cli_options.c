@@ -549,7 +549,7 @@ static const struct {
     {"temp-dir", "FOLDER", 0, B | V | S | R, o_temp_dir,
      "where scratch files go (default: beside the output)"},
     {"inner-depth", "N", 0, B | V | S | R, o_depth,
-     "levels of the octree inside each node, 1 to 9 (default: 7)"},
+     "levels of the octree inside each node, 1 to 9 (default: 6)"},
     {"columns", "NAMES", 0, B | V | S | R, o_columns,
      "columns of text files, as in x,y,z,intensity,r,g,b; - skips one"},
     {"attributes", "NAMES", 0, B | V | S | R, o_attributes,

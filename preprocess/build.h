@@ -6,7 +6,7 @@
 #include "mospt/dataset.h"
 #include "preprocess/source.h"
 
-enum { PREP_INNER_DEPTH_DEFAULT = 7 };
+enum { PREP_INNER_DEPTH_DEFAULT = 6 };
 
 typedef enum { PREP_PHASE_MEASURE, PREP_PHASE_READ, PREP_PHASE_WRITE, PREP_PHASES } prep_phase;
 
@@ -29,7 +29,7 @@ typedef struct {
     bool dedupe;             /* of several points at one position, keep only the first */
     uint32_t threads;        /* 0: one per processor */
     uint64_t memory;         /* bytes, the peak of the process; 0: a quarter of the machine */
-    uint32_t inner_depth;    /* 0: 7 */
+    uint32_t inner_depth;    /* 0: 6 */
     prep_scan_options scans; /* columns, poses, crop */
     const char *attributes;  /* names, separated by commas, of those to keep besides "scan", or
                                 "none"; NULL: all */
