@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TILE_PX = 4, TILE_PIXELS = TILE_PX * TILE_PX, COVERED = 6, LEVELS_MAX = 16 };
+enum { TILE_PX = 4, TILE_PIXELS = TILE_PX * TILE_PX, LEVELS_MAX = 16 };
+/* Of a tile's pixels, those that must be covered. */
+enum { COVERED = 6, COVERED_OPEN = 9 };
 /* Clearly behind: noise and the thickness of a wall are not another room. */
 #define BEHIND 1.01f
 
@@ -154,14 +156,14 @@ static void sort_tiles(float *sorted, uint32_t width)
                         order(sorted + (size_t)i * width, sorted + (size_t)(i + k) * width, width);
 }
 
-/* As many pixels of a tile must be covered. */
-static void find_tiles(rend_occlusion *o)
+/* covered  of a tile's pixels */
+static void find_tiles(rend_occlusion *o, uint32_t covered)
 {
     level *l = &o->levels[0];
     for (uint32_t y = 0; y < l->height; y++) {
         gather(o, y);
         sort_tiles(o->sorted, l->width);
-        memcpy(l->nearest + (size_t)y * l->width, o->sorted + (size_t)(COVERED - 1) * l->width,
+        memcpy(l->nearest + (size_t)y * l->width, o->sorted + (size_t)(covered - 1) * l->width,
                l->width * sizeof *l->nearest);
     }
 }
@@ -197,9 +199,9 @@ static void reduce(const level *fine, const level *coarse)
         }
 }
 
-void rend_occlusion_learn(rend_occlusion *occlusion, const rend_frame *frame)
+void rend_occlusion_learn(rend_occlusion *occlusion, const rend_frame *frame, bool is_open)
 {
-    find_tiles(occlusion);
+    find_tiles(occlusion, is_open ? COVERED_OPEN : COVERED);
     shrink_silhouettes(&occlusion->levels[0]);
     for (uint32_t l = 1; l < occlusion->level_count; l++)
         reduce(&occlusion->levels[l - 1], &occlusion->levels[l]);

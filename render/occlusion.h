@@ -7,7 +7,9 @@
  * A wall of points has gaps, and a tree is nearly a wall: a tile of 4 x 4 pixels is as far away as
  * the sixth of its pixels when they are sorted by depth. So what covers less of it hides nothing,
  * and what covers more closes it: of a wall with a tenth of gaps every tile does, of a tree with
- * half of them one tile in ten does not, and a node covers a hundred tiles. Each tile then takes
+ * half of them one tile in ten does not, and a node covers a hundred tiles. Where points are no
+ * wider for being far from each other, gaps are part of the picture, and what is seen through one
+ * surface and another closes nothing: there twelve of the pixels count. Each tile then takes
  * the farthest depth of itself and its neighbours, so that nothing hides beyond its own silhouette.
  * Above that, a tile is the farthest of four.
  *
@@ -33,8 +35,9 @@ void rend_occlusion_destroy(rend_occlusion *occlusion);
 float *rend_occlusion_depths(rend_occlusion *occlusion, uint32_t width, uint32_t height);
 
 /* Makes the pyramid of the depths that were put there.
- * frame    that they are of */
-void rend_occlusion_learn(rend_occlusion *occlusion, const rend_frame *frame);
+ * frame    that they are of
+ * is_open  gaps between the points are to be seen through */
+void rend_occlusion_learn(rend_occlusion *occlusion, const rend_frame *frame, bool is_open);
 
 /* Hides nothing until it learns again. */
 void rend_occlusion_forget(rend_occlusion *occlusion);

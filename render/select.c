@@ -7,6 +7,8 @@
 #include <string.h>
 
 enum { NONE = 0xffffffff, FLOOR_PARTS = 4 }; /* of half a node's width, see select.h */
+/* Cells of a surface that are this much of a point wide, or less, close it. */
+#define CLOSED 0.8f
 
 /* A node that has been looked at and is not skipped. */
 typedef struct {
@@ -360,6 +362,32 @@ static uint32_t density_level(const mospt_node *n, uint32_t depth, uint32_t coun
     return level;
 }
 
+/* Cells in which an octant has about a point each when all are drawn, with those of a child that it
+ * has; wider than they are where that child has children. Steps. */
+static float spacing_in(const walk *w, const mospt_node *n, uint32_t octant)
+{
+    uint32_t bit = 1u << octant, depth = w->in->hierarchy->inner_depth, level = depth;
+    float width = (float)mospt_cell_width(w->in->grid, n->level);
+    if ((n->pending_mask & bit) != 0) return ldexpf(width, -(int)depth);
+    if ((n->child_mask & bit) != 0) {
+        uint32_t before = (uint32_t)__builtin_popcount(n->child_mask & (bit - 1));
+        n = &w->in->hierarchy->nodes[n->first_child + before];
+        width /= 2;
+    }
+    if ((n->child_mask | n->pending_mask) == 0) level = density_level(n, depth, n->count);
+    return ldexpf(width, -(int)level);
+}
+
+/* True if one sees between the points that the picture has there, see own_px.
+ * width_px of the node */
+static bool is_open(const walk *w, const mospt_node *n, uint32_t octant, float width_px)
+{
+    const rend_select_input *in = w->in;
+    if (in->own_px <= 0 && in->own_cell <= 0) return false;
+    float width = (float)mospt_cell_width(in->grid, n->level);
+    return spacing_in(w, n, octant) > fmaxf(CLOSED * in->own_px * width / width_px, in->own_cell);
+}
+
 static uint32_t splat_of(float width)
 {
     uint32_t bits;
@@ -379,8 +407,11 @@ static bool draw(walk *w, seen_node *seen, uint32_t parent, uint32_t count, floa
           finest = ldexpf(width, -(int)depth),
           reached = fminf(fmaxf(width * (cell_px / seen->width_px), finest), width),
           sampled = fmaxf(reached, ldexpf(width, -(int)density_level(n, depth, count)));
-    for (uint32_t o = 0; o < 8; o++)
-        r->octants[8 * (size_t)r->draw_count + o] = splat_of(below >> o & 1 ? reached : sampled);
+    for (uint32_t o = 0; o < 8; o++) {
+        float cell = below >> o & 1 ? reached : sampled;
+        if (is_open(w, n, o, seen->width_px)) cell = w->in->own_cell;
+        r->octants[8 * (size_t)r->draw_count + o] = splat_of(cell);
+    }
     link_to_parent(w, n, parent);
     r->draws[r->draw_count] = (rend_draw){
         .node = seen->node,

@@ -69,8 +69,13 @@ typedef struct {
      * does. */
     uint64_t page_limit; /* 0: no limit */
     uint32_t page_points;
-    const rend_clip *clip; /* nodes outside are skipped like those of step 2; NULL: none. Points
-                              outside in nodes that are not count as drawn. */
+    /* How wide the points of a picture are that this selection is drawn for, to find out what hides
+     * others in it; both 0: as wide as cells. Where the dataset has points enough to close that
+     * picture, splats stand for all of them, and are as wide as cells. Where it has not, one sees
+     * between the points, and splats are no wider than those. The wider of both counts. */
+    float own_px, own_cell; /* pixels; as the cell of a splat, steps */
+    const rend_clip *clip;  /* nodes outside are skipped like those of step 2; NULL: none. Points
+                               outside in nodes that are not count as drawn. */
 } rend_select_input;
 
 typedef struct {

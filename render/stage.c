@@ -473,12 +473,12 @@ static bool run_selection(rend_stage *s, const rend_view_of *view, const rend_se
 
 /* The depths of what has been drawn are what things can be hidden behind. Without memory for them
  * nothing is. */
-static bool learn_occlusion(rend_stage *s, mospt_err *err)
+static bool learn_occlusion(rend_stage *s, const rend_view_of *view, mospt_err *err)
 {
     float *depths = rend_occlusion_depths(s->occlusion, s->frame.width, s->frame.height);
     if (depths == NULL) return true;
     if (!rgl_read_depths(s->gl, depths, err)) return false;
-    rend_occlusion_learn(s->occlusion, &s->frame);
+    rend_occlusion_learn(s->occlusion, &s->frame, view->look.size_mode != REND_SIZE_AUTO);
     return true;
 }
 
@@ -667,7 +667,7 @@ static bool look_behind(rend_stage *s, rend_progress *progress, mospt_err *err)
     if (r->hidden > 0 || r->stopped) *progress = REND_AGAIN;
     if (s->hand.is_guess) s->looks = 0;
     if (s->hand.is_guess && little && ++s->guesses % LOOK_EVERY != 0) return true;
-    return learn_occlusion(s, err);
+    return learn_occlusion(s, &s->hand.view, err);
 }
 
 static bool draw_frame(rend_stage *stage, const rend_view_of *view, const rend_allowance *allowed,
@@ -835,16 +835,21 @@ static bool may_hide(const rend_stage *s, const rend_view_of *view)
 }
 
 /* What hides others, from a part of the points: with cells nearly twice as wide, and as wide as
- * that, whatever the size of the picture's own points is, so that walls are closed. */
+ * that where the picture's own points will close a wall. */
 static bool draw_occluders(rend_stage *s, const rend_view_of *view, mospt_err *err)
 {
     rend_view_of closed = *view;
-    closed.look.size_mode = REND_SIZE_AUTO;
-    rend_select_input input = input_of(s, &closed);
+    rend_select_input input = input_of(s, view);
+    if (view->look.size_mode != REND_SIZE_AUTO) {
+        rgl_scene own = make_scene(s, view);
+        input.own_px = own.px_min, input.own_cell = own.splat_size / own.splat_scale;
+        closed.look.size_mode = REND_SIZE_AUTO, closed.look.point_px_min = own.px_min;
+        closed.look.point_px_max = fmaxf(own.px_min, rend_order_px_max(&closed.look));
+    }
     if (view->budget_points != REND_ALL) input.budget_points /= OCCLUDER_SHARE;
     input.cell_px = 1.4f;
     return run_selection(s, &closed, &input, err) && draw_all(s, &closed, RGL_BEGIN, 0, 0, err) &&
-           learn_occlusion(s, err);
+           learn_occlusion(s, view, err);
 }
 
 static bool draw_still(rend_stage *stage, const rend_view_of *view, mospt_err *err)

@@ -184,6 +184,34 @@ static void what_is_hidden_does_not_show_and_is_not_drawn(void **unused)
     render_site_fini(&site);
 }
 
+/* Walls of points so far apart that the rooms behind are seen through them. */
+static void what_is_seen_between_points_is_not_hidden(void **unused)
+{
+    (void)unused;
+    render_site site;
+    rend_shot_result all, seen;
+    uint8_t *with = malloc(PIXELS), *without = malloc(PIXELS);
+    uint32_t covered = 0, gone = 0;
+    render_rooms_make(800000, &site);
+    const mospt_metadata *m = &site.dataset->metadata;
+    rend_shot_options o = {.look = MASK, .camera = {.has_eye = true, .has_target = true}};
+    for (int a = 0; a < 3; a++)
+        o.camera.eye[a] = m->low[a] + (a < 2 ? 20 : 4), o.camera.target[a] = o.camera.eye[a];
+    o.camera.target[0] += 10, o.camera.target[1] += 4;
+    take(&site, "seen.png", o, &seen);
+    o.limits.no_occlusion = true;
+    take(&site, "all.png", o, &all);
+    covered_pixels(&site, "seen.png", with);
+    covered_pixels(&site, "all.png", without);
+    for (size_t i = 0; i < PIXELS; i++)
+        covered += without[i], gone += without[i] > with[i];
+    assert_true(all.points_drawn > 200000 && covered > PIXELS / 4 && covered < PIXELS);
+    assert_true(gone <= covered / 20); /* of random points; two fifths if walls were closed */
+    free(with);
+    free(without);
+    render_site_fini(&site);
+}
+
 static void cache_sizes_do_not_show(void **unused)
 {
     (void)unused;
@@ -326,6 +354,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_clip_box_cuts_exactly),
         cmocka_unit_test(the_same_options_give_the_same_bytes),
         cmocka_unit_test(what_is_hidden_does_not_show_and_is_not_drawn),
+        cmocka_unit_test(what_is_seen_between_points_is_not_hidden),
         cmocka_unit_test(cache_sizes_do_not_show),
         cmocka_unit_test(a_site_does_not_shake_at_utm_coordinates),
         cmocka_unit_test(every_look_can_be_drawn),

@@ -63,7 +63,7 @@ static void fill(fixture *f, float depth)
 
 static void learn(fixture *f)
 {
-    rend_occlusion_learn(f->occlusion, &f->frame);
+    rend_occlusion_learn(f->occlusion, &f->frame, false);
 }
 
 static void what_was_not_learnt_hides_nothing(void **unused)
@@ -93,6 +93,24 @@ static void a_wall_hides_what_is_behind_it_and_nothing_else(void **unused)
     assert_false(hides(&f, 10.5, 0, 0, 1));  /* in it */
     assert_false(hides(&f, 11.05, 0, 0, 1)); /* not clearly behind */
     assert_false(hides(&f, 0.5, 0, 0, 1));   /* around the eye */
+    stop(&f);
+}
+
+/* Half of each tile's pixels. */
+static void half_a_wall_hides_unless_gaps_are_to_be_seen_through(void **unused)
+{
+    (void)unused;
+    fixture f;
+    start(&f);
+    for (size_t i = 0; i < PIXELS; i++)
+        f.depths[i] = i % 2 ? 1 : depth_of(&f.frame, 10 * 1024);
+    learn(&f);
+    assert_true(hides(&f, 40, -8, -8, 16));
+    rend_occlusion_learn(f.occlusion, &f.frame, true);
+    assert_false(hides(&f, 40, -8, -8, 16));
+    fill(&f, depth_of(&f.frame, 10 * 1024));
+    rend_occlusion_learn(f.occlusion, &f.frame, true);
+    assert_true(hides(&f, 40, -8, -8, 16));
     stop(&f);
 }
 
@@ -320,6 +338,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_was_not_learnt_hides_nothing),
         cmocka_unit_test(a_wall_hides_what_is_behind_it_and_nothing_else),
+        cmocka_unit_test(half_a_wall_hides_unless_gaps_are_to_be_seen_through),
         cmocka_unit_test(nothing_hides_beyond_its_silhouette),
         cmocka_unit_test(a_wall_of_points_hides_and_a_tree_does_not),
         cmocka_unit_test(one_hole_of_a_door_is_seen_through),

@@ -439,7 +439,7 @@ static void hidden_nodes_are_skipped_and_counted(void **unused)
     assert_non_null(depths);
     for (uint32_t i = 0; i < frame.width * frame.height; i++)
         depths[i] = i % frame.width < frame.width / 2 ? 0 : 1;
-    rend_occlusion_learn(occlusion, &frame);
+    rend_occlusion_learn(occlusion, &frame, false);
     in.occlusion = occlusion;
     const rend_selection *s = run(&f, &in);
     assert_true(s->draw_count < all && s->draw_count > 1 && s->hidden > 0 && s->points_hidden > 0);
