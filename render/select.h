@@ -85,7 +85,7 @@ typedef struct {
     float widest_px; /* widest cell of its octants where the node is nearest to the eye */
 } rend_draw;
 
-/* Where splats of 1.25 cells (render/stage.c) are a pixel wide: nothing finer shows. */
+/* Where splats of 1.25 cells (render/order.h) are a pixel wide: nothing finer shows. */
 #define REND_CELL_PX_DEFAULT 0.8f
 
 enum { REND_NO_DRAW = 0xffffffff };

@@ -7,47 +7,10 @@
  * they arrive, a window shows them as they were.
  * threads  the one that has the context */
 #pragma once
-#include "mospt/dataset.h"
-#include "render/camera.h"
-#include "render/gl/rgl.h"
-#include "render/loader.h"
-#include "render/options.h"
-#include "render/scheme.h"
-#include "render/select.h"
+#include "render/colours.h"
+#include "render/live.h"
 
 typedef struct rend_stage rend_stage;
-
-typedef struct {
-    rend_camera camera;
-    uint32_t width, height; /* pixels */
-    rend_look look;
-    uint64_t budget_points; /* REND_ALL: no limit */
-    float min_node_px;      /* 0: see render/select.h */
-    float cell_px;          /* likewise */
-    bool no_occlusion;      /* nodes hidden behind others are drawn, too */
-    int parts;              /* RGL_TO_WINDOW or 0 */
-} rend_view_of;
-
-typedef struct {
-    uint64_t points_drawn, points_in_view; /* in view: all points of the nodes that a higher budget
-                                              would not reject first */
-    uint32_t nodes_drawn, nodes_visited;
-    uint32_t nodes_hidden;  /* left out behind others, with all below them */
-    uint64_t points_hidden; /* all points of these, without what is below */
-    bool budget_spent;
-    uint64_t ram_used, ram_limit, gpu_used, gpu_limit; /* bytes */
-    uint32_t gpu_halved;                               /* times, for want of graphics memory */
-    uint32_t resets;         /* of the graphics driver, after which all was made anew */
-    uint64_t loaded_bytes;   /* since the start */
-    uint64_t uploaded_bytes; /* since the start */
-    uint64_t points_total;   /* drawn since the start, part by part */
-    double waited_s;         /* for the loader, by rend_stage_still(), since the start */
-    uint32_t pending;        /* nodes that this view still misses */
-    uint32_t ahead;          /* nodes that are read because they will be seen shortly */
-    uint32_t damaged_nodes;
-    uint64_t damaged_points;
-    mospt_err damage; /* of the first damaged node; code MOSPT_OK without any */
-} rend_figures;
 
 /* dataset  borrowed
  * gl       borrowed
@@ -63,22 +26,6 @@ void rend_stage_destroy(rend_stage *stage);
  * dataset  borrowed; the one before may be closed afterwards
  * errors   MOSPT_ENOMEM, MOSPT_EIO: the stage is good for nothing but rend_stage_destroy() */
 bool rend_stage_swap(rend_stage *stage, const mospt_dataset *dataset, mospt_err *err);
-
-/* What a frame in a window may cost. */
-typedef struct {
-    uint64_t points;       /* drawn; a picture of more is drawn over several frames; 0: no limit */
-    uint64_t upload_bytes; /* a node more at most; 0: 64 MiB */
-    /* Where the camera will be shortly: when the frame itself misses nothing, what is missing there
-     * is read into memory. NULL: nobody knows. */
-    const rend_camera *ahead;
-} rend_allowance;
-
-typedef enum {
-    REND_SETTLED, /* the same view again would draw the same picture, and nothing more is to come */
-    REND_WAITING, /* as long as the loader does not wake anybody, too */
-    REND_AGAIN,   /* the next frame shows more */
-    REND_PART,    /* there is no picture yet: the same view again goes on drawing it */
-} rend_progress;
 
 /* Both fail with MOSPT_EINVAL for colours that the dataset cannot show, see rend_scheme_fits(). */
 

@@ -94,7 +94,7 @@ static rend_view_of view_at(const bench *b, double t, double later_s, uint64_t b
 
 /* ---- points as they are ---- */
 
-/* What render/stage.c makes of the usual look, at one pixel a point. */
+/* What render/picture.c makes of the usual look, at one pixel a point. */
 static rgl_scene plain_scene(const bench *b, const rend_frame *frame)
 {
     const rend_look *look = &b->o->look;

@@ -464,9 +464,6 @@ static void another_generation_takes_over_what_is_the_same(void **unused)
             rend_stage_figures(fresh.stage, &all);
             bool keeps = l == 0 && c == 0; /* colours that stay, and room */
             uint64_t again = after.loaded_bytes - before.loaded_bytes;
-            if (keeps)
-                print_message("AGAIN %lu of %lu, few %lu; ram %lu\n", again, all.loaded_bytes,
-                              before.loaded_bytes, before.ram_used);
             if (keeps) assert_true(again > 0 && again < all.loaded_bytes * 9 / 10);
             before = after;
             CORE_NEED(rend_stage_swap(s.stage, few.dataset, &err));
