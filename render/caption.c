@@ -1,7 +1,6 @@
 #include "render/caption.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { TITLE_LINES = 16, COUNTER_LINES = 36 }; /* of the picture's height */
 #define FADE_S 0.5
@@ -29,7 +28,7 @@ static void draw_line(const rgl_font *font, uint32_t width, uint32_t height, con
                       float opacity, bool right, uint8_t *rgb)
 {
     rgl_metrics m = rgl_font_metrics(font);
-    float pad = m.line / 2, wide = (float)strlen(words) * m.advance + 2 * pad;
+    float pad = m.line / 2, wide = (float)rgl_font_length(words) * m.advance + 2 * pad;
     float x = right ? (float)width - wide - pad : pad, y = (float)height - m.line - 3 * pad;
     const rgl_label labels[] = {
         {.x = x,

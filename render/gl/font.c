@@ -7,8 +7,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Latin-1: what file names and figures are made of. */
+/* Latin-1: what file names and figures are made of. In place of its control characters, dashes,
+ * quotation marks and the like: those of Windows-1252. */
 enum { FIRST = 32, LAST = 255, GLYPHS = LAST - FIRST + 1, COLUMNS = 16, ROWS = GLYPHS / COLUMNS };
+enum { MARKS_FIRST = 0x80, MARKS = 32 };
+static const uint16_t marks[MARKS] = {
+    0x20ac, 0,      0x201a, 0x0192, 0x201e, 0x2026, 0x2020, 0x2021, 0x02c6, 0x2030, 0x0160,
+    0x2039, 0x0152, 0,      0x017d, 0,      0,      0x2018, 0x2019, 0x201c, 0x201d, 0x2022,
+    0x2013, 0x2014, 0x02dc, 0x2122, 0x0161, 0x203a, 0x0153, 0,      0x017e, 0x0178};
 
 /* Path of the system's monospace font, owned; NULL if there is none. */
 static char *find_font(int *index)
@@ -59,10 +65,14 @@ static bool rasterise(rgl_font *f, FT_Face face, mospt_err *err)
     size_t size = (size_t)f->cell_width * COLUMNS * (size_t)f->cell_height * ROWS;
     f->atlas = calloc(size + 1, 1);
     if (f->atlas == NULL) return mospt_err_nomem(err, size);
-    for (int g = 0; g < GLYPHS; g++)
-        if (FT_Load_Char(face, (FT_ULong)(FIRST + g), FT_LOAD_RENDER) == 0 &&
+    for (int g = 0; g < GLYPHS; g++) {
+        int mark = FIRST + g - MARKS_FIRST;
+        FT_ULong character = (FT_ULong)(FIRST + g);
+        if (mark >= 0 && mark < MARKS) character = marks[mark] != 0 ? marks[mark] : ' ';
+        if (FT_Load_Char(face, character, FT_LOAD_RENDER) == 0 &&
             face->glyph->bitmap.pixel_mode == FT_PIXEL_MODE_GRAY)
             copy_glyph(f, face->glyph, g, ascent);
+    }
     return true;
 }
 
@@ -98,16 +108,25 @@ rgl_metrics rgl_font_metrics(const rgl_font *font)
     return (rgl_metrics){.advance = (float)font->cell_width, .line = (float)font->cell_height};
 }
 
-/* The next character; only one- and two-byte UTF-8 can be Latin-1. */
+/* The place of the next character among those of the font. */
 static int next_character(const unsigned char **at)
 {
     unsigned c = *(*at)++;
     if (c < 0x80) return c >= FIRST ? (int)c : '?';
-    unsigned value = (c & 0x1f) << 6 | (**at & 0x3f);
-    bool two = c >= 0xc2 && c <= 0xc3 && (**at & 0xc0) == 0x80;
-    while ((**at & 0xc0) == 0x80)
-        (*at)++;
-    return two ? (int)value : '?';
+    unsigned value = c >= 0xe0 ? c & 0xf : c & 0x1f;
+    for (; (**at & 0xc0) == 0x80; (*at)++)
+        value = value << 6 | (**at & 0x3f);
+    for (int m = 0; m < MARKS; m++)
+        if (marks[m] != 0 && value == marks[m]) return MARKS_FIRST + m;
+    return value >= MARKS_FIRST + MARKS && value <= LAST ? (int)value : '?';
+}
+
+uint32_t rgl_font_length(const char *words)
+{
+    uint32_t count = 0;
+    for (const unsigned char *at = (const unsigned char *)words; *at != '\0'; count++)
+        next_character(&at);
+    return count;
 }
 
 bool rgl_font_next(const rgl_font *font, const unsigned char **at, int texel[2])

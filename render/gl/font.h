@@ -10,7 +10,8 @@ typedef struct {
 typedef struct {
     float x, y;        /* top left, pixels from the top left */
     float colour[4];   /* red, green, blue, opacity */
-    const char *words; /* UTF-8, one line; what the font's Latin part does not have shows as '?' */
+    const char *words; /* UTF-8, one line; what is neither Latin-1 nor a dash, quotation mark or the
+                          like shows as '?' */
     float panel_size[2]; /* both above 0: a plain panel instead, `words` is not looked at */
 } rgl_label;
 
@@ -27,6 +28,9 @@ bool rgl_font_init(float size_px, rgl_font *out, mospt_err *err);
 void rgl_font_fini(rgl_font *font);
 
 rgl_metrics rgl_font_metrics(const rgl_font *font);
+
+/* Characters of a line of UTF-8: so many advances wide. */
+uint32_t rgl_font_length(const char *words);
 
 /* Reads one character of UTF-8 and moves on.
  * texel    its top left corner in the atlas; returns false for a blank, which has none */
