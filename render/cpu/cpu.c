@@ -186,8 +186,8 @@ static void blend_chunk(void *user, uint32_t worker, uint32_t job)
     cpu_rgl *c = round->c;
     const chunk *part = &c->chunks[job];
     rcpu_view view = view_of(round, &round->batches[part->batch]);
-    c->kernel->blend(&view, part->vertices, part->count, c->frames.frames[0],
-                     c->frames.sums[worker]);
+    rcpu_front front = rcpu_frames_front(&c->frames);
+    c->kernel->blend(&view, part->vertices, part->count, &front, &c->frames.sums[worker]);
 }
 
 static bool draw_points(cpu_rgl *c, const rgl_scene *scene, const rgl_batch *batches, int parts,
@@ -204,7 +204,8 @@ static bool draw_points(cpu_rgl *c, const rgl_scene *scene, const rgl_batch *bat
     }
     if (again) {
         rcpu_frames_merge(f, c->kernel, c->threads);
-        if (!f->blending && !rcpu_frames_blend(f, c->threads, err)) return false;
+        if (!f->blending && !rcpu_frames_blend(f, c->kernel, c->threads, scene->blend_slab, err))
+            return false;
         rcpu_threads_run(c->threads, f->sums_count, chunks, blend_chunk, &round);
     }
     return true;

@@ -22,9 +22,20 @@ static size_t frame_size(const rcpu_frames *f)
     return (pixels_of(f) + SPARE) * sizeof(int64_t);
 }
 
+/* Of packed sums, both kinds. */
 static size_t sums_size(const rcpu_frames *f)
 {
-    return pixels_of(f) * sizeof(rcpu_sums);
+    return pixels_of(f) * 2 * sizeof(uint64_t);
+}
+
+static size_t spilled_size(const rcpu_frames *f)
+{
+    return pixels_of(f) * sizeof(rcpu_wide);
+}
+
+static size_t limits_size(const rcpu_frames *f)
+{
+    return pixels_of(f) * sizeof(float);
 }
 
 static size_t picture_size(const rcpu_frames *f)
@@ -57,12 +68,33 @@ static void release_layer(const rcpu_frames *f, rcpu_layer *layer)
     rcpu_memory_release(layer->colours, layer_size(f));
 }
 
+static void release_sums(const rcpu_frames *f, rcpu_sums *sums)
+{
+    rcpu_memory_release(sums->colours, sums_size(f));
+    rcpu_memory_release(sums->spilled, spilled_size(f));
+}
+
+/* Wide sums take memory only where there are some. */
+static bool make_sums(const rcpu_frames *f, rcpu_sums *out, mospt_err *err)
+{
+    rcpu_sums sums = {.colours = rcpu_memory_take(sums_size(f)),
+                      .spilled = rcpu_memory_take(spilled_size(f))};
+    *out = sums;
+    if (sums.colours == NULL || sums.spilled == NULL) {
+        release_sums(f, &sums);
+        return mospt_err_nomem(err, sums_size(f) + spilled_size(f));
+    }
+    out->weights = sums.colours + pixels_of(f);
+    return true;
+}
+
 void rcpu_frames_fini(rcpu_frames *frames)
 {
     for (uint32_t i = 0; i < frames->frame_count; i++)
         rcpu_memory_release(frames->frames[i], frame_size(frames));
     for (uint32_t i = 0; i < frames->sums_count; i++)
-        rcpu_memory_release(frames->sums[i], sums_size(frames));
+        release_sums(frames, &frames->sums[i]);
+    rcpu_memory_release(frames->limits, limits_size(frames));
     release_layer(frames, &frames->points);
     release_layer(frames, &frames->blended);
     release_layer(frames, &frames->filled);
@@ -126,7 +158,7 @@ typedef struct {
     uint32_t drawn_count;
     const rcpu_light *light;
     const rcpu_hole *hole;
-    float slab_log;
+    float slab, slab_log;
     const rcpu_layer *from, *to;
 } pass;
 
@@ -211,29 +243,44 @@ void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_thre
     frames->merged = true;
 }
 
-static void clear_sums(void *user, uint32_t worker, uint32_t job)
+static void prepare_rows(void *user, uint32_t worker, uint32_t job)
 {
     (void)worker;
     pass *p = user;
-    size_t stride = p->frames->size.stride, first = job * ROWS_PER_JOB * stride;
-    for (uint32_t s = 0; s < p->frames->sums_count; s++)
-        memset(p->frames->sums[s] + first, 0,
-               (end_of(p->frames, job) * stride - first) * sizeof(rcpu_sums));
+    rcpu_frames *f = p->frames;
+    size_t first = (size_t)job * ROWS_PER_JOB * f->size.stride,
+           count = (size_t)end_of(f, job) * f->size.stride - first;
+    p->kernel->limit(f->frames[0] + first, (uint32_t)count, p->slab, f->limits + first);
+    for (uint32_t s = 0; s < f->sums_count; s++) {
+        const rcpu_sums *sums = &f->sums[s];
+        memset(sums->colours + first, 0, count * sizeof *sums->colours);
+        memset(sums->weights + first, 0, count * sizeof *sums->weights);
+        if (sums->has_spilled) memset(sums->spilled + first, 0, count * sizeof *sums->spilled);
+    }
 }
 
-bool rcpu_frames_blend(rcpu_frames *frames, rcpu_threads *threads, mospt_err *err)
+bool rcpu_frames_blend(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,
+                       float slab, mospt_err *err)
 {
     uint32_t count = count_for(sums_size(frames), frames->frame_count);
     if (!make_layer(frames, &frames->blended, err)) return false;
-    while (frames->sums_count < count) {
-        rcpu_sums *sums = rcpu_memory_take(sums_size(frames));
-        if (sums == NULL) return mospt_err_nomem(err, sums_size(frames));
-        frames->sums[frames->sums_count++] = sums;
-    }
-    pass p = {.frames = frames};
-    run(&p, threads, clear_sums);
+    if (frames->limits == NULL) frames->limits = rcpu_memory_take(limits_size(frames));
+    if (frames->limits == NULL) return mospt_err_nomem(err, limits_size(frames));
+    for (; frames->sums_count < count; frames->sums_count++)
+        if (!make_sums(frames, &frames->sums[frames->sums_count], err)) return false;
+    pass p = {.frames = frames, .kernel = kernel, .slab = slab};
+    run(&p, threads, prepare_rows);
+    for (uint32_t s = 0; s < count; s++)
+        frames->sums[s].has_spilled = false;
     frames->blending = true;
     return true;
+}
+
+rcpu_front rcpu_frames_front(const rcpu_frames *frames)
+{
+    const rcpu_layer *points = &frames->points;
+    return (rcpu_front){
+        .limits = frames->limits, .logs = points->logs + points->margin, .stride = points->stride};
 }
 
 static void resolve_rows(void *user, uint32_t worker, uint32_t job)
@@ -243,9 +290,9 @@ static void resolve_rows(void *user, uint32_t worker, uint32_t job)
     rcpu_frames *f = p->frames;
     for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++) {
         size_t first = (size_t)y * f->size.stride, at = in_layer(p->to, y);
-        p->kernel->add(f->sums, f->sums_count, first, f->size.width);
-        p->kernel->resolve(f->sums[0] + first, f->frames[0] + first, f->size.width, p->slab_log,
-                           p->to->logs + at, p->to->colours + at);
+        p->kernel->resolve(f->sums, f->sums_count, first, f->size.width,
+                           f->points.logs + in_layer(&f->points, y), p->slab_log, p->to->logs + at,
+                           p->to->colours + at);
         extend(f, p->to, y);
     }
 }

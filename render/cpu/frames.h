@@ -18,7 +18,8 @@ typedef struct {
     uint32_t frame_count;               /* threads that draw: no more than there is memory for */
     bool drawn[RCPU_FRAMES_MAX];        /* into, since they were merged or emptied */
     bool merged;                        /* all is in the first frame, and in `points` */
-    rcpu_sums *sums[RCPU_FRAMES_MAX];   /* [sums_count] of [stride * height], owned */
+    rcpu_sums sums[RCPU_FRAMES_MAX];    /* [sums_count] */
+    float *limits;                      /* [stride * height], owned: rcpu_front; made with sums */
     uint32_t sums_count;                /* 0: not needed yet */
     bool blending;                      /* sums belong to the picture in hand */
     rcpu_layer points, blended, filled; /* the last two are made when they are needed */
@@ -38,9 +39,11 @@ void rcpu_frames_clear(rcpu_frames *frames, rcpu_threads *threads);
 /* Brings all into the first frame, and that into the layer `points`. */
 void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads);
 
-/* Empties the sums.
+/* Makes ready for blending what has been merged: the sums are empty.
  * errors   MOSPT_ENOMEM */
-bool rcpu_frames_blend(rcpu_frames *frames, rcpu_threads *threads, mospt_err *err);
+bool rcpu_frames_blend(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,
+                       float slab, mospt_err *err);
+rcpu_front rcpu_frames_front(const rcpu_frames *frames);
 
 /* Passes from layer to layer.
  * hole, slab_log   radius 0, or 0: without filling, without blending

@@ -8,10 +8,10 @@ void RCPU_NAME(splats)(const rcpu_view *view, const mospt_vertex *vertices, uint
 void RCPU_NAME(merge)(int64_t *const *frames, uint32_t frame_count, size_t from, size_t count);
 void RCPU_NAME(look)(const int64_t *row, uint32_t count, float *logs, uint32_t *colours);
 void RCPU_NAME(blend)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
-                      const int64_t *nearest, rcpu_sums *sums);
-void RCPU_NAME(add)(rcpu_sums *const *sums, uint32_t sums_count, size_t from, size_t count);
-void RCPU_NAME(resolve)(const rcpu_sums *sums, const int64_t *nearest, uint32_t count,
-                        float slab_log, float *logs, uint32_t *colours);
+                      const rcpu_front *front, rcpu_sums *sums);
+void RCPU_NAME(limit)(const int64_t *row, uint32_t count, float slab, float *limits);
+void RCPU_NAME(resolve)(const rcpu_sums *sums, uint32_t sums_count, size_t from, uint32_t count,
+                        const float *nearest, float slab_log, float *logs, uint32_t *colours);
 void RCPU_NAME(fill)(const rcpu_hole *hole, uint32_t y, const rcpu_layer *from,
                      const rcpu_layer *to);
 void RCPU_NAME(shade)(const rcpu_light *light, uint32_t y, const rcpu_layer *layer, uint32_t *rgba);
@@ -27,7 +27,7 @@ const rcpu_kernel RCPU_NAME(kernel) = {
     .merge = RCPU_NAME(merge),
     .look = RCPU_NAME(look),
     .blend = RCPU_NAME(blend),
-    .add = RCPU_NAME(add),
+    .limit = RCPU_NAME(limit),
     .resolve = RCPU_NAME(resolve),
     .fill = RCPU_NAME(fill),
     .shade = RCPU_NAME(shade),

@@ -42,10 +42,27 @@ typedef struct {
     float slab, slab_log; /* of blending: a share of the distance, and log2(1 + slab) */
 } rcpu_view;
 
+/* What blending compares with, for each pixel. */
+typedef struct {
+    const float *limits; /* [stride of the frame * height] the farthest distance that counts; -1
+                            where there is no point */
+    const float *logs;   /* [stride * height] of the nearest distances, from the first pixel on */
+    uint32_t stride;
+} rcpu_front;
+
 /* What is summed up of one pixel, see section 2 of render/gl/rgl.h. */
 typedef struct {
-    uint32_t r, g, b, weight;
-    int32_t depth;
+    uint64_t r, g, b, weight;
+    int64_t depth;
+} rcpu_wide;
+
+/* The sums of one thread: packed, so that two additions make them, and where they become too large
+ * for that, wide. */
+typedef struct {
+    uint64_t *colours;  /* [stride * height], owned: r, and 21 and 42 bits higher g and b */
+    uint64_t *weights;  /* [stride * height], owned: depth, and 32 bits higher the weight */
+    rcpu_wide *spilled; /* [stride * height], owned: what is missing in the above */
+    bool has_spilled;
 } rcpu_sums;
 
 /* What a picture shows of each pixel before it is lit: log2 of the distance, and the colour. Rows
@@ -83,14 +100,15 @@ typedef struct {
     void (*merge)(int64_t *const *frames, uint32_t frame_count, size_t from, size_t count);
     /* A row of a frame as a layer has it. */
     void (*look)(const int64_t *row, uint32_t count, float *logs, uint32_t *colours);
+    /* How far away points of a row may be that blending counts: rcpu_front. */
+    void (*limit)(const int64_t *row, uint32_t count, float slab, float *limits);
     /* Adds up what is near enough behind the nearest. */
     void (*blend)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
-                  const int64_t *nearest, rcpu_sums *sums);
-    /* Makes sums[0][from .. from + count - 1] the sum of all, and the others zero. */
-    void (*add)(rcpu_sums *const *sums, uint32_t sums_count, size_t from, size_t count);
-    /* A row of sums as a layer has it. */
-    void (*resolve)(const rcpu_sums *sums, const int64_t *nearest, uint32_t count, float slab_log,
-                    float *logs, uint32_t *colours);
+                  const rcpu_front *front, rcpu_sums *sums);
+    /* All sums of pixels from .. from + count - 1, a row, as a layer has it.
+     * nearest  logarithms of the nearest distances */
+    void (*resolve)(const rcpu_sums *sums, uint32_t sums_count, size_t from, uint32_t count,
+                    const float *nearest, float slab_log, float *logs, uint32_t *colours);
     /* Fills the holes of a row. */
     void (*fill)(const rcpu_hole *hole, uint32_t y, const rcpu_layer *from, const rcpu_layer *to);
     /* Shades a row.

@@ -1,22 +1,9 @@
 /* Splats of several pixels: squares, discs, and discs that bend away from the eye. */
 #include "render/cpu/place.h"
+#include "render/cpu/span.h"
 
 void RCPU_NAME(splats)(const rcpu_view *view, const mospt_vertex *vertices, uint32_t count,
                        int64_t *frame);
-
-/* Pixels of a row, as many as fit a vector. */
-enum { SPAN = RCPU_LANES / 2 };
-typedef int64_t span_l __attribute__((vector_size(8 * SPAN)));
-typedef int32_t span_i __attribute__((vector_size(4 * SPAN)));
-typedef float span_f __attribute__((vector_size(4 * SPAN)));
-
-static inline span_i span_count(void)
-{
-    span_i count;
-    for (int i = 0; i < SPAN; i++)
-        count[i] = i;
-    return count;
-}
 
 /* Pixels beyond the mask are written as they were: a frame belongs to one thread, and has room at
  * its end. */
@@ -33,8 +20,10 @@ static void draw_square(const rcpu_splats *s, uint32_t l, int64_t key, uint32_t 
                         int64_t *frame)
 {
     span_l keys = (span_l){0} + key;
-    for (int32_t x = s->left[l]; x < s->right[l]; x += SPAN) {
-        span_l mask = __builtin_convertvector(span_count() < s->right[l] - x, span_l);
+    for (int32_t x = s->left[l] & -SPAN; x < s->right[l]; x += SPAN) {
+        span_i column = span_count() + x;
+        span_l mask =
+            __builtin_convertvector((column >= s->left[l]) & (column < s->right[l]), span_l);
         for (int32_t y = s->top[l]; y < s->bottom[l]; y++)
             put(frame + (size_t)y * stride + x, keys, mask);
     }
@@ -54,10 +43,10 @@ static void draw_disc(const rcpu_view *v, const rcpu_splats *s, uint32_t l, int6
                       int64_t *frame)
 {
     float scale = 2 / s->size[l], bend = v->bend * s->size[l];
-    span_f count = __builtin_convertvector(span_count(), span_f);
-    for (int32_t x = s->left[l]; x < s->right[l]; x += SPAN) {
-        span_f dx = ((count + ((float)x + 0.5f)) - s->x[l]) * scale;
-        span_i within = span_count() < s->right[l] - x;
+    for (int32_t x = s->left[l] & -SPAN; x < s->right[l]; x += SPAN) {
+        span_i column = span_count() + x;
+        span_f dx = ((__builtin_convertvector(column, span_f) + 0.5f) - s->x[l]) * scale;
+        span_i within = (column >= s->left[l]) & (column < s->right[l]);
         for (int32_t y = s->top[l]; y < s->bottom[l]; y++) {
             float dy = ((float)y + 0.5f - s->y[l]) * scale;
             span_f r2 = dx * dx + dy * dy;
