@@ -389,6 +389,36 @@ static void depths_show_before_the_end(void **state)
     rgl_destroy(cpu);
 }
 
+/* More points in a pixel than the narrow sums of its colours can hold. */
+static void any_number_of_points_in_a_pixel_is_averaged(void **state)
+{
+    (void)state;
+    rgl_scene scene = PLAIN;
+    mospt_vertex *v = malloc(POINTS * sizeof *v);
+    scene.frame = frame_of(INSIDE, ORIGIN), scene.blend_slab = 0.01f;
+    for (uint32_t i = 0; i < POINTS; i++) {
+        v[i] = (mospt_vertex){.x = 3u << (BITS - 2), .y = 1u << (BITS - 1), .z = 1u << (BITS - 1)};
+        v[i].r = i % 2 == 0 ? 10 : 200, v[i].g = i % 2 == 0 ? 20 : 100;
+        v[i].b = i % 2 == 0 ? 30 : 50;
+    }
+    for (uint32_t threads = 1; threads <= 3; threads++) {
+        rgl *cpu = make_cpu(threads, NULL);
+        picture *p = draw(cpu, &scene, v, RGL_SQUARE);
+        uint32_t covered = 0;
+        for (uint32_t i = 0; i < PIXELS; i++) {
+            if (p->depths[i] == p->depths[0]) continue;
+            covered++;
+            assert_int_equal(p->rgb[3 * i], 105);
+            assert_int_equal(p->rgb[3 * i + 1], 60);
+            assert_int_equal(p->rgb[3 * i + 2], 40);
+        }
+        assert_int_equal(covered, 1);
+        free(p);
+        rgl_destroy(cpu);
+    }
+    free(v);
+}
+
 static void impossible_pictures_are_refused(void **state)
 {
     (void)state;
@@ -416,6 +446,7 @@ int main(void)
         cmocka_unit_test(the_order_of_points_does_not_show),
         cmocka_unit_test(more_points_join_a_finished_picture),
         cmocka_unit_test(depths_show_before_the_end),
+        cmocka_unit_test(any_number_of_points_in_a_pixel_is_averaged),
         cmocka_unit_test(impossible_pictures_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
