@@ -5,6 +5,7 @@
 
 #include "render/film/join.h"
 #include "render/path_file.h"
+#include "render/reel.h"
 #include "render/tour.h"
 
 #include <inttypes.h>
@@ -123,13 +124,24 @@ static void report_json(const cli_options *o, const rend_record_result *r)
                           "damaged_nodes", (json_int_t)r->damaged_nodes, "renderer", r->renderer));
 }
 
+/* Where to look: a film, or the first of numbered pictures. */
+static void print_place(const cli_options *o)
+{
+    char *picture =
+        rend_reel_is_pictures(o->output) ? rend_reel_picture_name(o->output, o->film.first) : NULL;
+    if (picture != NULL) printf("%s and after", picture);
+    else printf("%s", o->output);
+    free(picture);
+}
+
 void cli_record_report(const cli_options *options, const rend_record_result *r)
 {
     if (options->json) {
         report_json(options, r);
         return;
     }
-    printf("%s: %" PRIu64 " frames", options->output, r->frames);
+    print_place(options);
+    printf(": %" PRIu64 " frames", r->frames);
     if (r->drawn < r->frames) printf(", %" PRIu64 " of them in this run", r->drawn);
     if (r->drawn > 0)
         printf(", at most %.2f M points each, %.1f frames/s on %s", (double)r->points_most / 1e6,
