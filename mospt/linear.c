@@ -5,7 +5,7 @@
 
 enum {
     FEW = 64, /* points in one cell, for a plain sort */
-    SIBLINGS = 8,
+    SIBLINGS = MOSPT_CHILDREN_MAX,
     RUN = 256, /* points that stand for cells, whose parents are found at a time */
 };
 

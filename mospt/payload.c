@@ -83,7 +83,7 @@ static uint64_t hash_records(const uint8_t *const *from, size_t stride, uint32_t
 {
     uint64_t sum = 0;
     for (uint32_t i = 0; i < count; i++)
-        sum += mospt_hash_records(from[i], stride, 1);
+        sum += mospt_hash(from[i], stride);
     return sum;
 }
 

@@ -151,7 +151,17 @@ static uint8_t *read_rgb(const render_site *site, const char *name)
     return rgb;
 }
 
-/* Seen from the middle of one of many rooms. */
+/* The eye in the middle of one of many rooms. */
+static rend_camera_options inside_of_a_room(const render_site *site)
+{
+    const mospt_metadata *m = &site->dataset->metadata;
+    rend_camera_options camera = {.has_eye = true, .has_target = true};
+    for (int a = 0; a < 3; a++)
+        camera.eye[a] = m->low[a] + (a < 2 ? 20 : 4), camera.target[a] = camera.eye[a];
+    camera.target[0] += 10, camera.target[1] += 4;
+    return camera;
+}
+
 static void what_is_hidden_does_not_show_and_is_not_drawn(void **unused)
 {
     (void)unused;
@@ -159,11 +169,7 @@ static void what_is_hidden_does_not_show_and_is_not_drawn(void **unused)
     rend_shot_result all, seen;
     uint32_t differ = 0;
     render_rooms_make(3000000, &site);
-    const mospt_metadata *m = &site.dataset->metadata;
-    rend_shot_options o = {.camera = {.has_eye = true, .has_target = true}};
-    for (int a = 0; a < 3; a++)
-        o.camera.eye[a] = m->low[a] + (a < 2 ? 20 : 4), o.camera.target[a] = o.camera.eye[a];
-    o.camera.target[0] += 10, o.camera.target[1] += 4;
+    rend_shot_options o = {.camera = inside_of_a_room(&site)};
     take(&site, "seen.png", o, &seen);
     o.limits.no_occlusion = true;
     take(&site, "all.png", o, &all);
@@ -193,11 +199,7 @@ static void what_is_seen_between_points_is_not_hidden(void **unused)
     uint8_t *with = malloc(PIXELS), *without = malloc(PIXELS);
     uint32_t covered = 0, gone = 0;
     render_rooms_make(800000, &site);
-    const mospt_metadata *m = &site.dataset->metadata;
-    rend_shot_options o = {.look = MASK, .camera = {.has_eye = true, .has_target = true}};
-    for (int a = 0; a < 3; a++)
-        o.camera.eye[a] = m->low[a] + (a < 2 ? 20 : 4), o.camera.target[a] = o.camera.eye[a];
-    o.camera.target[0] += 10, o.camera.target[1] += 4;
+    rend_shot_options o = {.look = MASK, .camera = inside_of_a_room(&site)};
     take(&site, "seen.png", o, &seen);
     o.limits.no_occlusion = true;
     take(&site, "all.png", o, &all);
