@@ -29,6 +29,16 @@ void *prep_pages_take(size_t size)
     return memory + before;
 }
 
+void prep_pages_touch(void *memory, size_t size)
+{
+#ifdef MADV_POPULATE_WRITE
+    uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)memory / page * page;
+    madvise((void *)begin, (uintptr_t)memory + size - begin, MADV_POPULATE_WRITE); /* only faster */
+#else
+    (void)memory, (void)size;
+#endif
+}
+
 void prep_pages_give(void *memory, size_t size)
 {
     if (memory != NULL) munmap(memory, rounded(size));

@@ -9,5 +9,10 @@
  * threads  any */
 void *prep_pages_take(size_t size);
 
+/* Has the system clear what lies in [memory, memory + size) now, if it has not yet, and leaves what
+ * is written there.
+ * threads  any */
+void prep_pages_touch(void *memory, size_t size);
+
 /* Gives them back; NULL is fine. */
 void prep_pages_give(void *memory, size_t size);

@@ -5,7 +5,7 @@
 
 #include <stdlib.h>
 
-enum { OCTANTS = 8 };
+enum { OCTANTS = 8, TOUCH_SIZE = 2 << 20 };
 
 /* An octant at the end of the pass: what was accepted in it level by level, and what goes below. */
 typedef struct {
@@ -47,6 +47,8 @@ struct prep_pass {
     batch *prepared; /* the next to go into the buckets; NULL: none */
 
     /* The round being run: */
+    uint8_t *untouched; /* memory that will be filled in the next one */
+    size_t untouched_size;
     batch *preparing; /* NULL: none */
     prep_pass_prepare prepare;
     void *context;
@@ -280,13 +282,30 @@ static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
     }
 }
 
-/* Job: first the buckets of the batch that is prepared, then the slices of the next one. */
+static uint32_t touch_count(const prep_pass *p)
+{
+    return (uint32_t)((p->untouched_size + TOUCH_SIZE - 1) / TOUCH_SIZE);
+}
+
+/* Job: memory is cleared by the system when it is first touched, which takes longer than what is
+ * done with it. Most points of a tripod's scan lie in one bucket, whose thread would do all of that
+ * alone. */
+static void touch(const prep_pass *p, uint32_t piece)
+{
+    size_t begin = piece * (size_t)TOUCH_SIZE, left = p->untouched_size - begin;
+    prep_pages_touch(p->untouched + begin, left < TOUCH_SIZE ? left : TOUCH_SIZE);
+}
+
+/* Job: first memory for the next round, then the buckets of the batch that is prepared, then the
+ * slices of the next one. */
 static void run_job(void *context, uint32_t job)
 {
     prep_pass *p = context;
-    uint32_t fills = p->prepared != NULL ? p->prepared->touched_count : 0;
-    if (job < fills) fill_bucket(p, p->prepared, p->prepared->touched[job]);
-    else prepare_slice(p, job - fills);
+    uint32_t touches = touch_count(p),
+             fills = p->prepared != NULL ? p->prepared->touched_count : 0;
+    if (job < touches) touch(p, job);
+    else if (job < touches + fills) fill_bucket(p, p->prepared, p->prepared->touched[job - touches]);
+    else prepare_slice(p, job - touches - fills);
 }
 
 static void find_touched(const prep_pass *p, batch *b)
@@ -319,8 +338,13 @@ static bool run_round(prep_pass *p, batch *next, mospt_err *err)
 {
     batch *from = p->prepared;
     uint32_t fills = from != NULL ? from->touched_count : 0;
+    uint32_t slices = next != NULL ? next->slice_count : 0;
+    size_t batch_size = (size_t)slices * PREP_PASS_SLICE * p->stride;
     p->preparing = next;
-    prep_workers_run(p->env->workers, fills + (next != NULL ? next->slice_count : 0), run_job, p);
+    p->untouched = prep_store_untouched(p->env->store, 2 * batch_size,
+                                        prep_workers_count(p->env->workers) * (size_t)TOUCH_SIZE,
+                                        &p->untouched_size);
+    prep_workers_run(p->env->workers, touch_count(p) + fills + slices, run_job, p);
     p->prepared = next;
     for (uint32_t t = 0; t < fills; t++) {
         const bucket *b = &p->buckets[from->touched[t]];

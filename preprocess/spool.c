@@ -34,6 +34,7 @@ struct prep_store {
     uint64_t slot_count;        /* the scratch file is so many blocks long */
     slab *slabs;                /* owned */
     uint8_t *fresh, *fresh_end; /* of the newest slab */
+    uint8_t *touched;           /* up to here all of that has been touched, or will be */
     uint8_t *free_blocks;       /* each begins with a pointer to the next */
 };
 
@@ -55,6 +56,7 @@ static uint8_t *take_memory(prep_store *s)
                 s->slabs = fresh;
                 s->fresh = (uint8_t *)fresh + sizeof(mospt_vertex);
                 s->fresh_end = (uint8_t *)fresh + size;
+                s->touched = fresh;
             }
         }
         if ((size_t)(s->fresh_end - s->fresh) >= s->block_size) {
@@ -64,6 +66,19 @@ static uint8_t *take_memory(prep_store *s)
     }
     pthread_mutex_unlock(&s->lock);
     return memory;
+}
+
+uint8_t *prep_store_untouched(prep_store *s, size_t ahead, size_t unit, size_t *size)
+{
+    pthread_mutex_lock(&s->lock);
+    uint8_t *begin = s->touched > s->fresh ? s->touched : s->fresh;
+    size_t there = (size_t)(begin - s->fresh), left = (size_t)(s->fresh_end - begin);
+    *size = 0;
+    if (s->free_blocks == NULL && there < ahead) *size = (ahead - there + unit - 1) / unit * unit;
+    if (*size > left) *size = left;
+    s->touched = begin + *size;
+    pthread_mutex_unlock(&s->lock);
+    return begin;
 }
 
 static void give_memory(prep_store *s, uint8_t *memory)

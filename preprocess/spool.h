@@ -42,6 +42,13 @@ uint32_t prep_store_block_shift(const prep_store *store);
 /* Bytes of a block. */
 size_t prep_store_block_size(const prep_store *store);
 
+/* Memory that the next blocks come from and that nobody has touched, so that many threads can do it
+ * before one fills them, see prep_pages_touch(). It is told once.
+ * ahead  bytes that will be filled
+ * unit   bytes: it is told in multiples of so many, but where a piece of memory ends
+ * size   out: bytes, 0 where there is none */
+uint8_t *prep_store_untouched(prep_store *store, size_t ahead, size_t unit, size_t *size);
+
 /* Makes room in a spool whose last block is full. Use prep_spool_append(). */
 bool prep_spool_grow(prep_store *store, prep_spool *spool, mospt_err *err);
 

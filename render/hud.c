@@ -25,7 +25,7 @@ static const char *const HELP[] = {
     "Z  shift Z         narrower, wider field of view",
     "P                  save a picture",
     "T  J               take the view as a keyframe;  play them",
-    "N  X  < >          next keyframe, delete it, move it in time",
+    "N  X  < >          next keyframe (shift: the one before), delete it, move it in time",
     "F                  full screen",
     "H  F1              this help",
     "Esc  ctrl W        quit",

@@ -63,12 +63,13 @@ static void save(rend_strip *s, const char *what)
 
 /* ---- keys ---- */
 
+/* Behind the last comes the first. */
 static void choose(rend_strip *s, int32_t index, rend_key *now)
 {
     int32_t last = (int32_t)s->path.count - 1;
     stop(s);
     if (last < 0) return;
-    s->chosen = index < 0 ? 0 : index > last ? last : index;
+    s->chosen = index < 0 ? last : index > last ? 0 : index;
     *now = s->path.keys[s->chosen];
 }
 
