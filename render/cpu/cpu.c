@@ -1,6 +1,7 @@
 #include "render/cpu/cpu.h"
 
 #include "render/cpu/frames.h"
+#include "render/cpu/log.h"
 #include "render/cpu/memory.h"
 #include "render/gl/driver.h"
 
@@ -13,8 +14,6 @@ enum {
     CHUNK_POINTS = 8192,   /* 128 KiB of vertices: a fifth of a millisecond */
     EDL_RADIUS_MAX = 1024, /* pixels */
 };
-
-#define DEPTH_OF_POINT_MAX 0.99999994f /* 1 says that there is none */
 
 /* Points that one thread draws in one go. */
 typedef struct {
@@ -300,10 +299,8 @@ static float depth_at(const cpu_rgl *c, int x, int y)
     const rcpu_frames *f = &c->frames;
     if (x < 0 || y < 0 || x >= (int)f->size.width || y >= (int)f->size.height) return 1;
     const rcpu_layer *l = &f->points;
-    float log = l->logs[(size_t)y * l->stride + l->margin + (size_t)x];
-    return log == RCPU_SKY
-               ? 1
-               : fminf(fmaxf((log - c->near_log) / c->range_log, 0), DEPTH_OF_POINT_MAX);
+    return rcpu_depth(l->logs[(size_t)y * l->stride + l->margin + (size_t)x], c->near_log,
+                      c->range_log);
 }
 
 static bool cpu_read_depth(rgl *gl, int x, int y, int radius, float *out, mospt_err *err)
@@ -322,9 +319,7 @@ static bool cpu_read_depths(rgl *gl, float *out, mospt_err *err)
     (void)err;
     cpu_rgl *c = (cpu_rgl *)gl;
     look(c);
-    for (int y = 0; y < (int)c->frames.size.height; y++)
-        for (int x = 0; x < (int)c->frames.size.width; x++)
-            *out++ = depth_at(c, x, y);
+    rcpu_frames_depths(&c->frames, c->threads, c->near_log, c->range_log, out);
     return true;
 }
 

@@ -1,5 +1,6 @@
 #include "render/cpu/frames.h"
 
+#include "render/cpu/log.h"
 #include "render/cpu/memory.h"
 
 #include <string.h>
@@ -159,6 +160,8 @@ typedef struct {
     const rcpu_light *light;
     const rcpu_hole *hole;
     float slab, slab_log;
+    float near_log, range_log;
+    float *depths; /* [width * height] */
     const rcpu_layer *from, *to;
 } pass;
 
@@ -241,6 +244,26 @@ void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_thre
     memset(frames->drawn, 0, sizeof frames->drawn);
     frames->drawn[0] = true;
     frames->merged = true;
+}
+
+static void depth_rows(void *user, uint32_t worker, uint32_t job)
+{
+    (void)worker;
+    pass *p = user;
+    const rcpu_frames *f = p->frames;
+    for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++) {
+        const float *restrict logs = f->points.logs + in_layer(&f->points, y);
+        float *restrict out = p->depths + (size_t)y * f->size.width;
+        for (uint32_t x = 0; x < f->size.width; x++)
+            out[x] = rcpu_depth(logs[x], p->near_log, p->range_log);
+    }
+}
+
+void rcpu_frames_depths(rcpu_frames *frames, rcpu_threads *threads, float near_log, float range_log,
+                        float *out)
+{
+    pass p = {.frames = frames, .near_log = near_log, .range_log = range_log, .depths = out};
+    run(&p, threads, depth_rows);
 }
 
 static void prepare_rows(void *user, uint32_t worker, uint32_t job)

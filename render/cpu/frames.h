@@ -39,6 +39,11 @@ void rcpu_frames_clear(rcpu_frames *frames, rcpu_threads *threads);
 /* Brings all into the first frame, and that into the layer `points`. */
 void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads);
 
+/* Depths of what has been merged, see rcpu_depth().
+ * out      [width * height] */
+void rcpu_frames_depths(rcpu_frames *frames, rcpu_threads *threads, float near_log, float range_log,
+                        float *out);
+
 /* Makes ready for blending what has been merged: the sums are empty.
  * errors   MOSPT_ENOMEM */
 bool rcpu_frames_blend(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,

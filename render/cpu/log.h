@@ -1,5 +1,6 @@
-/* render/cpu/log.h - log2 of distances, the same in every kernel. */
+/* render/cpu/log.h - log2 of distances, the same in every kernel, and depths made of them. */
 #pragma once
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -17,4 +18,14 @@ static inline float rcpu_log2(uint32_t bits)
         2.88539008f +
         t2 * (0.961796694f + t2 * (0.577078016f + t2 * (0.412198583f + t2 * 0.320598898f)));
     return (float)exponent + t * series;
+}
+
+/* Depth of a logarithm, as rgl_read_depths() says it: 0 near, 1 where there is no point.
+ * near_log, range_log  log2 of the nearest distance, and of the farthest by that */
+static inline float rcpu_depth(float log, float near_log, float range_log)
+{
+    float depth = (log - near_log) / range_log;
+    depth = depth > 0 ? depth : 0;
+    depth = depth < 0.99999994f ? depth : 0.99999994f; /* of a point */
+    return log == INFINITY ? 1 : depth;
 }
