@@ -1,8 +1,7 @@
 /* How fast pictures are drawn, and how good they are; scripts/bench_render explains. */
-#include "render/curve.h"
 #include "render/engine.h"
 #include "render/stage.h"
-#include "render/tour.h"
+#include "scripts/bench_flight.h"
 #include "scripts/bench_picture.h"
 #include "scripts/bench_points.h"
 #include "scripts/plain_loop.h"
@@ -36,8 +35,7 @@ typedef struct {
     rgl *raw;
     rend_selector *selector;
     plain_loop *loop;
-    rend_curve *orbit, *walk; /* outside, inside */
-    double orbit_s, walk_s;
+    bench_flight flight;
 } bench;
 
 static double now_ms(void)
@@ -53,37 +51,9 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* ---- the flight: half of it around the site, half of it through it ---- */
-
-static bool make_curve(rend_path *path, rend_curve **out, double *duration_s, mospt_err *err)
-{
-    *duration_s = rend_path_duration(path);
-    bool ok = rend_curve_create(path, out, err);
-    rend_path_fini(path);
-    return ok;
-}
-
-static bool make_flight(bench *b, mospt_err *err)
-{
-    rend_path path;
-    double aspect = (double)b->o->width / b->o->height;
-    return rend_tour_orbit(b->dataset, aspect, &path, err) &&
-           make_curve(&path, &b->orbit, &b->orbit_s, err) &&
-           rend_tour_walk(b->dataset, &path, err) && make_curve(&path, &b->walk, &b->walk_s, err);
-}
-
-/* t, 0 to 1; later_s after that */
-static rend_camera camera_at(const bench *b, double t, double later_s)
-{
-    rend_moment moment;
-    if (t < 0.5) rend_curve_at(b->orbit, 2 * t * b->orbit_s + later_s, &moment);
-    else rend_curve_at(b->walk, (2 * t - 1) * b->walk_s + later_s, &moment);
-    return moment.camera;
-}
-
 static rend_view_of view_at(const bench *b, double t, double later_s, uint64_t budget)
 {
-    return (rend_view_of){.camera = camera_at(b, t, later_s),
+    return (rend_view_of){.camera = bench_flight_at(&b->flight, t, later_s),
                           .width = b->o->width,
                           .height = b->o->height,
                           .look = b->o->look,
@@ -270,7 +240,8 @@ static bool visit_all(bench *b, rend_stage *stage, mospt_err *err)
     return true;
 }
 
-/* Frames follow each other, for a while: nobody reads for the next one while limits are drawn. */
+/* Frames follow each other, for a while: nobody reads for the next one while limits are drawn, and
+ * the first one after that is drawn once more, as it was, before they go on. */
 static bool fly(bench *b, rend_stage *stage, bool no_occlusion, flown *out, mospt_err *err)
 {
     uint32_t n = b->o->frames;
@@ -293,6 +264,7 @@ static bool fly(bench *b, rend_stage *stage, bool no_occlusion, flown *out, mosp
         usleep(PAUSE_US);
         for (; limit <= i && ok; limit++)
             ok = time_limits(b, &r, limit, &frames[limit], err);
+        ok = ok && fly_frame(b, stage, i, false, no_occlusion, &ms, err);
     }
     out->loaded_bytes = f.loaded_bytes - before.loaded_bytes;
     out->uploaded_bytes = f.uploaded_bytes - before.uploaded_bytes;
@@ -400,7 +372,7 @@ static bool take_share(bench *b, double t, double share, picture *out, mospt_err
     for (int moment = 0; moment < 2; moment++) {
         rend_frame frame;
         const rend_selection *sizes = NULL;
-        rend_camera camera = camera_at(b, t, moment / 30.0);
+        rend_camera camera = bench_flight_at(&b->flight, t, moment / 30.0);
         rend_frame_make(&camera, &b->dataset->metadata.grid, low, high, b->o->width, b->o->height,
                         &frame);
         if (b->o->look.size_mode == REND_SIZE_AUTO && !select_all(b, &frame, &sizes, err))
@@ -536,7 +508,8 @@ static bool run(const options *o, mospt_err *err)
     b.loop = plain_loop_create(o->width, o->height, o->threads);
     if (b.selector == NULL || b.loop == NULL) return mospt_err_nomem(err, 0);
     bool ok = mospt_dataset_open(o->dataset, &b.dataset, err) &&
-              bench_points_load(b.dataset, &b.points, err) && make_flight(&b, err) &&
+              bench_points_load(b.dataset, &b.points, err) &&
+              bench_flight_make(b.dataset, (double)o->width / o->height, &b.flight, err) &&
               open_engines(&b, err) && (!o->speed || measure_speed(&b, err)) &&
               (!o->quality || measure_quality(&b, err));
     if (b.raw != b.second.gl) rgl_destroy(b.raw);
@@ -544,8 +517,7 @@ static bool run(const options *o, mospt_err *err)
     rend_engine_close(&b.engine);
     rend_select_destroy(b.selector);
     plain_loop_destroy(b.loop);
-    rend_curve_destroy(b.orbit);
-    rend_curve_destroy(b.walk);
+    bench_flight_fini(&b.flight);
     bench_points_fini(&b.points);
     mospt_dataset_close(b.dataset);
     return ok;
