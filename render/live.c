@@ -1,5 +1,6 @@
 #include "render/live.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* 64 MiB cross any bus in a few milliseconds; more in one frame would be felt as a stutter. */
@@ -11,12 +12,23 @@ enum { LOOK_EVERY = 8, LOOKS_AT_REST = 6 };
 bool rend_live_init(rend_live *live, rend_picture *picture, mospt_err *err)
 {
     *live = (rend_live){.picture = picture, .ahead = rend_select_create()};
-    return live->ahead != NULL || mospt_err_nomem(err, 0);
+    return (live->ahead != NULL || mospt_err_nomem(err, 0)) && rend_live_swap(live, err);
+}
+
+bool rend_live_swap(rend_live *live, mospt_err *err)
+{
+    size_t count = live->picture->dataset->hierarchy.count;
+    free(live->ages);
+    live->ages = malloc(count + 1);
+    if (live->ages == NULL) return mospt_err_nomem(err, count);
+    memset(live->ages, REND_GROWN, count);
+    return true;
 }
 
 void rend_live_fini(rend_live *live)
 {
     rend_select_destroy(live->ahead);
+    free(live->ages);
     *live = (rend_live){0};
 }
 
@@ -54,8 +66,9 @@ static bool fetch_stale(rend_picture *p, fetching *f, mospt_err *err)
 }
 
 /* What the selection asked for, as far as it is not there or damaged yet. */
-static bool fetch_requested(rend_picture *p, fetching *f, mospt_err *err)
+static bool fetch_requested(rend_live *live, fetching *f, mospt_err *err)
 {
+    rend_picture *p = live->picture;
     for (uint32_t i = 0; i < p->selection->request_count; i++) {
         uint32_t node = p->selection->requests[i].node;
         if (rend_store_residency(p->store)[node] != REND_ABSENT) {
@@ -73,6 +86,7 @@ static bool fetch_requested(rend_picture *p, fetching *f, mospt_err *err)
         /* The selection asks for no more than fits, and what was just put there must not make room
          * for what comes next. */
         if (!rend_store_put(p->store, node, vertices, err)) return false;
+        live->ages[node] = 0;
         f->bytes += mospt_dataset_vertices_size(p->dataset, node);
     }
     return true;
@@ -113,7 +127,7 @@ static bool fetch(rend_live *live, const rend_allowance *allowed, rend_progress 
     p->figures.pending = 0;
     p->figures.ahead = 0;
     rend_store_want_nothing(p->store);
-    if (!fetch_stale(p, &f, err) || !fetch_requested(p, &f, err)) return false;
+    if (!fetch_stale(p, &f, err) || !fetch_requested(live, &f, err)) return false;
     uint32_t wanted = rend_store_wanted(p->store);
     *progress = f.progress == REND_SETTLED && wanted > 0 ? REND_WAITING : f.progress;
     if (wanted == 0 && allowed->ahead != NULL && !fetch_ahead(live, allowed->ahead, err))
@@ -138,6 +152,19 @@ static void forget_other_shapes(rend_live *live, const rend_view_of *view)
     live->points_before = 0;
 }
 
+/* Another picture is about to be drawn. */
+static void grow(rend_live *live)
+{
+    uint32_t count = live->picture->dataset->hierarchy.count;
+    live->is_growing = false;
+    if (live->in_parts) memset(live->ages, REND_GROWN, count);
+    for (uint32_t n = 0; n < count; n++) {
+        uint8_t is_young = live->ages[n] < REND_GROWN;
+        live->is_growing |= is_young;
+        live->ages[n] = (uint8_t)(live->ages[n] + is_young);
+    }
+}
+
 static bool begin_picture(rend_live *live, const rend_view_of *view, mospt_err *err)
 {
     rend_picture *p = live->picture;
@@ -146,8 +173,10 @@ static bool begin_picture(rend_live *live, const rend_view_of *view, mospt_err *
     input.residency = rend_store_residency(p->store);
     input.page_limit = rend_store_page_count(p->store);
     input.occlusion = p->occlusion;
+    input.ages = live->in_parts ? NULL : live->ages;
     live->is_guess = !rend_occlusion_aim(p->occlusion, &p->frame);
     if (!rend_picture_select(p, view, &input, err)) return false;
+    grow(live);
     rend_store_unpin_all(p->store);
     for (uint32_t i = 0; i < p->selection->draw_count; i++)
         if (!rend_store_pin(p->store, p->selection->draws[i].node, err)) return false;
@@ -178,6 +207,7 @@ static bool draw_part(rend_live *live, uint64_t most, mospt_err *err)
     bool first = from == 0 && !live->again, end = to == p->selection->draw_count;
     bool again = blend && (live->again || (first && end));
     bool last = end && again == blend;
+    live->in_parts = first ? !last : live->in_parts;
     int parts = (first ? RGL_BEGIN : 0) | (again ? RGL_AGAIN : 0) | (last ? RGL_END : 0);
     rend_figures before = p->figures;
     if (!rend_picture_draw(p, &live->view, from, to, parts, err)) return false;
@@ -216,7 +246,7 @@ bool rend_live_frame(rend_live *live, const rend_view_of *view, const rend_allow
     if (!goes_on && !begin_picture(live, view, err)) return false;
     if (!draw_part(live, allowed->points, err) || !fetch(live, allowed, progress, err))
         return false;
-    if (!live->begun) return look_behind(live, progress, err);
-    *progress = REND_PART;
-    return true;
+    if (live->begun) *progress = REND_PART;
+    else if (live->is_growing) *progress = REND_AGAIN;
+    return live->begun || look_behind(live, progress, err);
 }

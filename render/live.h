@@ -31,6 +31,10 @@ typedef struct {
     uint32_t next;     /* in the order */
     rend_view_of view;
 
+    uint8_t *ages;   /* [node count], owned: see rend_select_input */
+    bool is_growing; /* something was not grown in the picture in hand */
+    bool in_parts; /* the picture took several frames: the next one is not drawn for growth only */
+
     uint32_t hidden_before; /* nodes, in the picture before; and points drawn in it */
     uint64_t points_before;
     uint32_t looks, guesses; /* behind pictures since the camera rests; pictures of guesses */
@@ -38,6 +42,10 @@ typedef struct {
 
 bool rend_live_init(rend_live *live, rend_picture *picture, mospt_err *err);
 void rend_live_fini(rend_live *live); /* {0} is fine */
+
+/* Another generation of the dataset, see rend_picture_swap(); what is drawn already does not grow
+ * in again. errors   MOSPT_ENOMEM */
+bool rend_live_swap(rend_live *live, mospt_err *err);
 
 /* Drops the picture in hand, after which the picture's selection can be put to other uses. */
 void rend_live_drop(rend_live *live);

@@ -424,6 +424,14 @@ static bool draw(walk *w, seen_node *seen, uint32_t parent, uint32_t count, floa
     return true;
 }
 
+/* The x at which a node is drawn: it grows in from its first points on. */
+static double grown_to(const walk *w, const seen_node *seen, double x)
+{
+    const uint8_t *ages = w->in->ages;
+    if (ages == NULL || ages[seen->node] >= REND_GROWN || seen->node == 0) return x;
+    return fmin(x, seen->begin * pow(4, (ages[seen->node] + 1.0) / (REND_GROWN + 1)));
+}
+
 /* Draws or requests what shows at x, in the order in which it was popped: parents stand before
  * their children. */
 static bool take(walk *w, double x, mospt_err *err)
@@ -433,14 +441,15 @@ static bool take(walk *w, double x, mospt_err *err)
     for (uint32_t i = 0; i < s->popped_count; i++) {
         seen_node *seen = &s->seen[s->popped[i]];
         uint32_t count = seen->node == 0, parent = REND_NO_DRAW;
+        double own_x = grown_to(w, seen, x);
         for (uint32_t k = seen->levels; k < levels_end(s, s->popped[i]); k++)
-            count += rend_growth_at(s->levels[k], x);
+            count += rend_growth_at(s->levels[k], own_x);
         if (seen->parent != NONE) parent = s->seen[seen->parent].draw;
         seen->draw = parent;
         rend_residency residency = residency_of(w, seen->node);
         if (residency == REND_DAMAGED || count == 0) continue;
         if (residency == REND_ABSENT ? !request(w, seen, err)
-                                     : !draw(w, seen, parent, count, s->result.cell_px, err))
+                                     : !draw(w, seen, parent, count, (float)(1 / sqrt(own_x)), err))
             return false;
     }
     return true;

@@ -29,7 +29,9 @@
  * nearer than a quarter of half its width, so that a node does not take the whole budget by one
  * corner that touches the eye.
  *
- * What has to be fetched counts as drawn: when it arrives, the cell size stays as it is.
+ * What has to be fetched counts as drawn: when it arrives, the cell size stays as it is. It does
+ * not show at once: in the first of a few pictures its cells are nearly as wide as its parent's
+ * finest, from picture to picture they shrink to what the budget has bought, and splats with them.
  *
  * Splat sizes (end of section 5.3) follow the finest node drawn around a point, which need not be
  * the one that the point is stored in: the points of the root stand everywhere between those of its
@@ -61,9 +63,11 @@ typedef struct {
     const rend_frame *frame;
     const rend_occlusion *occlusion; /* aimed at the frame; NULL: nothing is hidden */
     const uint8_t *residency; /* [hierarchy->count] rend_residency; NULL: everything is resident */
-    uint64_t budget_points;   /* 0: nothing; REND_ALL: no limit */
-    float min_node_px;        /* nodes but the root that project to less are skipped; 0: none */
-    float cell_px;            /* cells are no smaller than this; 0: REND_CELL_PX_DEFAULT */
+    const uint8_t *ages; /* [hierarchy->count] pictures that have been drawn since a node arrived;
+                            REND_GROWN or more: it is grown; NULL: all are */
+    uint64_t budget_points; /* 0: nothing; REND_ALL: no limit */
+    float min_node_px;      /* nodes but the root that project to less are skipped; 0: none */
+    float cell_px;          /* cells are no smaller than this; 0: REND_CELL_PX_DEFAULT */
     /* What is drawn and requested must fit the GPU cache together, or nodes would push each other
      * out for ever: nodes that do not are as if beyond the budget. Counted in pages, as the cache
      * does. */
@@ -89,6 +93,9 @@ typedef struct {
 #define REND_CELL_PX_DEFAULT 0.8f
 
 enum { REND_NO_DRAW = 0xffffffff };
+
+/* Pictures after which a node that has arrived is drawn like all others. */
+enum { REND_GROWN = 4 };
 
 /* An octant of a drawn node: the index of the child in the draw list, or, with this bit, the bits
  * of a float: minus the cell's width in steps. */

@@ -43,7 +43,7 @@ bool rend_stage_swap(rend_stage *stage, const mospt_dataset *dataset, mospt_err 
     if (!rend_colours_swap(&stage->colours, dataset, err)) return false;
     if (!rend_store_swap(stage->store, dataset, err)) return false;
     rend_picture_swap(&stage->picture, dataset);
-    return true;
+    return rend_live_swap(&stage->live, err);
 }
 
 /* What is on the GPU stays there, to be drawn until it has been replaced. */

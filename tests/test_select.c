@@ -377,6 +377,46 @@ static void points_come_one_after_the_other(void **unused)
     stop(&f);
 }
 
+/* From picture to picture a node that has arrived shows more, with smaller splats, up to what it
+ * would show if it had always been there; its ancestors stay as they are. */
+static void what_has_arrived_grows_in(void **unused)
+{
+    (void)unused;
+    fixture f;
+    uint32_t grew = 0;
+    start(&f, 20, 3, 800, 16);
+    uint8_t *ages = malloc(f.tree.count);
+    uint32_t *grown = calloc(f.tree.count, sizeof *grown),
+             *before = calloc(f.tree.count, sizeof *before);
+    assert_true(ages != NULL && grown != NULL && before != NULL);
+    rend_camera c = overview(&f.grid);
+    rend_frame frame;
+    render_frame_make(&c, &f.grid, &frame);
+    rend_select_input in = input_for(&f, &frame, REND_ALL);
+    const rend_selection *s = run(&f, &in);
+    uint64_t all = s->points, last = 0;
+    for (uint32_t d = 0; d < s->draw_count; d++)
+        grown[s->draws[d].node] = s->draws[d].count;
+    in.ages = ages;
+    for (uint32_t age = 0; age <= REND_GROWN; age++) {
+        for (uint32_t n = 0; n < f.tree.count; n++)
+            ages[n] = (uint8_t)(f.tree.nodes[n].level < 2 ? REND_GROWN : age);
+        s = run(&f, &in);
+        assert_true(s->points > last);
+        last = s->points;
+        for (uint32_t d = 0; d < s->draw_count; d++) {
+            uint32_t node = s->draws[d].node, count = s->draws[d].count;
+            assert_true(count <= grown[node] && count >= before[node]);
+            if (f.tree.nodes[node].level < 2) assert_int_equal(count, grown[node]);
+            else grew += count > before[node] && before[node] > 0;
+            before[node] = count;
+        }
+    }
+    assert_true(last == all && grew > 100);
+    free(ages), free(grown), free(before);
+    stop(&f);
+}
+
 static void a_damaged_node_does_not_hide_what_is_below(void **unused)
 {
     (void)unused;
@@ -466,6 +506,7 @@ int main(void)
         cmocka_unit_test(the_root_shows_a_level_when_its_cells_are_a_pixel_wide),
         cmocka_unit_test(points_come_one_after_the_other),
         cmocka_unit_test(a_missing_child_leaves_no_gap),
+        cmocka_unit_test(what_has_arrived_grows_in),
         cmocka_unit_test(a_damaged_node_does_not_hide_what_is_below),
         cmocka_unit_test(the_same_frame_is_selected_alike),
         cmocka_unit_test(hidden_nodes_are_skipped_and_counted),
