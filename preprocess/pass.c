@@ -301,10 +301,10 @@ static void touch(const prep_pass *p, uint32_t piece)
 static void run_job(void *context, uint32_t job)
 {
     prep_pass *p = context;
-    uint32_t touches = touch_count(p),
-             fills = p->prepared != NULL ? p->prepared->touched_count : 0;
+    uint32_t touches = touch_count(p), fills = p->prepared != NULL ? p->prepared->touched_count : 0;
     if (job < touches) touch(p, job);
-    else if (job < touches + fills) fill_bucket(p, p->prepared, p->prepared->touched[job - touches]);
+    else if (job < touches + fills)
+        fill_bucket(p, p->prepared, p->prepared->touched[job - touches]);
     else prepare_slice(p, job - touches - fills);
 }
 

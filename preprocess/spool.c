@@ -73,8 +73,11 @@ uint8_t *prep_store_untouched(prep_store *s, size_t ahead, size_t unit, size_t *
     pthread_mutex_lock(&s->lock);
     uint8_t *begin = s->touched > s->fresh ? s->touched : s->fresh;
     size_t there = (size_t)(begin - s->fresh), left = (size_t)(s->fresh_end - begin);
+    /* Where there is little memory, none of it is for later. */
+    bool is_little = unit > s->full_limit * s->block_size / 8;
     *size = 0;
-    if (s->free_blocks == NULL && there < ahead) *size = (ahead - there + unit - 1) / unit * unit;
+    if (s->free_blocks == NULL && there < ahead && !is_little)
+        *size = (ahead - there + unit - 1) / unit * unit;
     if (*size > left) *size = left;
     s->touched = begin + *size;
     pthread_mutex_unlock(&s->lock);

@@ -43,7 +43,8 @@ uint32_t prep_store_block_shift(const prep_store *store);
 size_t prep_store_block_size(const prep_store *store);
 
 /* Memory that the next blocks come from and that nobody has touched, so that many threads can do it
- * before one fills them, see prep_pages_touch(). It is told once.
+ * before one fills them, see prep_pages_touch(). It is told once, and not at all where it would be
+ * much of what may stay in memory.
  * ahead  bytes that will be filled
  * unit   bytes: it is told in multiples of so many, but where a piece of memory ends
  * size   out: bytes, 0 where there is none */
