@@ -18,9 +18,11 @@ bool rend_live_init(rend_live *live, rend_picture *picture, mospt_err *err)
 bool rend_live_swap(rend_live *live, mospt_err *err)
 {
     size_t count = live->picture->dataset->hierarchy.count;
-    free(live->ages);
+    free(live->ages), free(live->young);
     live->ages = malloc(count + 1);
-    if (live->ages == NULL) return mospt_err_nomem(err, count);
+    live->young = malloc((count + 1) * sizeof *live->young);
+    live->young_count = 0;
+    if (live->ages == NULL || live->young == NULL) return mospt_err_nomem(err, count);
     memset(live->ages, REND_GROWN, count);
     return true;
 }
@@ -28,7 +30,7 @@ bool rend_live_swap(rend_live *live, mospt_err *err)
 void rend_live_fini(rend_live *live)
 {
     rend_select_destroy(live->ahead);
-    free(live->ages);
+    free(live->ages), free(live->young);
     *live = (rend_live){0};
 }
 
@@ -45,22 +47,27 @@ typedef struct {
     rend_progress progress;
 } fetching;
 
+/* The vertices of a missing node, to be uploaded now. NULL: they are to be read, which is asked for
+ * here, or the frame has uploaded enough. */
+static const mospt_vertex *take(rend_picture *p, uint32_t node, fetching *f)
+{
+    const mospt_vertex *vertices = rend_store_vertices(p->store, node);
+    p->figures.pending++;
+    if (vertices == NULL) rend_store_want(p->store, node);
+    else f->progress = REND_AGAIN;
+    if (vertices == NULL || f->bytes >= f->most) return NULL;
+    f->bytes += mospt_dataset_vertices_size(p->dataset, node);
+    return vertices;
+}
+
 /* Puts new colours over the old ones: a node keeps its place. */
 static bool fetch_stale(rend_picture *p, fetching *f, mospt_err *err)
 {
     for (uint32_t i = 0; i < p->selection->draw_count; i++) {
         uint32_t node = p->selection->draws[i].node;
         if (!rend_store_is_stale(p->store, node)) continue;
-        p->figures.pending++;
-        const mospt_vertex *vertices = rend_store_vertices(p->store, node);
-        if (vertices == NULL) {
-            rend_store_want(p->store, node);
-            continue;
-        }
-        f->progress = REND_AGAIN;
-        if (f->bytes >= f->most) break;
-        if (!rend_store_replace(p->store, node, vertices, err)) return false;
-        f->bytes += mospt_dataset_vertices_size(p->dataset, node);
+        const mospt_vertex *vertices = take(p, node, f);
+        if (vertices != NULL && !rend_store_replace(p->store, node, vertices, err)) return false;
     }
     return true;
 }
@@ -75,19 +82,13 @@ static bool fetch_requested(rend_live *live, fetching *f, mospt_err *err)
             f->progress = REND_AGAIN; /* since an earlier part of this picture */
             continue;
         }
-        p->figures.pending++;
-        const mospt_vertex *vertices = rend_store_vertices(p->store, node);
-        if (vertices == NULL) {
-            rend_store_want(p->store, node);
-            continue;
-        }
-        f->progress = REND_AGAIN;
-        if (f->bytes >= f->most) continue;
+        const mospt_vertex *vertices = take(p, node, f);
+        if (vertices == NULL) continue;
         /* The selection asks for no more than fits, and what was just put there must not make room
          * for what comes next. */
         if (!rend_store_put(p->store, node, vertices, err)) return false;
+        if (live->ages[node] == REND_GROWN) live->young[live->young_count++] = node;
         live->ages[node] = 0;
-        f->bytes += mospt_dataset_vertices_size(p->dataset, node);
     }
     return true;
 }
@@ -155,14 +156,14 @@ static void forget_other_shapes(rend_live *live, const rend_view_of *view)
 /* Another picture is about to be drawn. */
 static void grow(rend_live *live)
 {
-    uint32_t count = live->picture->dataset->hierarchy.count;
-    live->is_growing = false;
-    if (live->in_parts) memset(live->ages, REND_GROWN, count);
-    for (uint32_t n = 0; n < count; n++) {
-        uint8_t is_young = live->ages[n] < REND_GROWN;
-        live->is_growing |= is_young;
-        live->ages[n] = (uint8_t)(live->ages[n] + is_young);
+    uint32_t kept = 0;
+    live->is_growing = live->young_count > 0 && !live->in_parts;
+    for (uint32_t i = 0; i < live->young_count; i++) {
+        uint8_t *age = &live->ages[live->young[i]];
+        *age = live->in_parts ? REND_GROWN : (uint8_t)(*age + 1);
+        if (*age < REND_GROWN) live->young[kept++] = live->young[i];
     }
+    live->young_count = kept;
 }
 
 static bool begin_picture(rend_live *live, const rend_view_of *view, mospt_err *err)

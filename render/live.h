@@ -32,6 +32,8 @@ typedef struct {
     rend_view_of view;
 
     uint8_t *ages;   /* [node count], owned: see rend_select_input */
+    uint32_t *young; /* [node count], owned: the nodes that are not grown */
+    uint32_t young_count;
     bool is_growing; /* something was not grown in the picture in hand */
     bool in_parts; /* the picture took several frames: the next one is not drawn for growth only */
 
