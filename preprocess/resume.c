@@ -2,6 +2,7 @@
 
 #include "mospt/payload.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 
 /* What is known of a node that is in the dataset. */
@@ -17,22 +18,46 @@ struct prep_resume {
     kept *kept; /* [node count], owned */
 };
 
-/* Job: reads one node. */
-static void read_node(void *context, uint32_t i)
+/* All nodes, by whichever thread has nothing to do. */
+typedef struct {
+    prep_resume *resume;
+    size_t largest; /* payload, bytes */
+    atomic_uint next;
+} reading;
+
+static void read_node(prep_resume *r, uint32_t i, uint8_t *payload)
 {
-    prep_resume *r = context;
     const mospt_dataset *d = r->dataset;
     const mospt_node *n = &d->hierarchy.nodes[i];
-    size_t vertices_size = mospt_dataset_vertices_size(d, i);
-    uint8_t *payload = malloc((size_t)n->payload_size);
-    if (payload != NULL &&
-        mospt_dataset_read_vertices(d, i, (mospt_vertex *)(void *)payload, NULL) &&
-        mospt_dataset_read_attributes(d, i, payload + vertices_size, NULL)) {
-        r->kept[i].is_there = true;
-        r->kept[i].points_hash = mospt_payload_points_hash(&d->metadata.schema, payload,
-                                                           payload + vertices_size, n->count);
-    }
+    uint8_t *attributes = payload + mospt_dataset_vertices_size(d, i);
+    if (!mospt_dataset_read_vertices(d, i, (mospt_vertex *)(void *)payload, NULL) ||
+        !mospt_dataset_read_attributes(d, i, attributes, NULL))
+        return;
+    r->kept[i].is_there = true;
+    r->kept[i].points_hash =
+        mospt_payload_points_hash(&d->metadata.schema, payload, attributes, n->count);
+}
+
+/* Job: a thread's share, into memory that it uses again and again. Without any, nothing is there.
+ */
+static void read_nodes(void *context, uint32_t thread)
+{
+    reading *r = context;
+    uint32_t count = r->resume->dataset->hierarchy.count;
+    uint8_t *payload = malloc(r->largest);
+    (void)thread;
+    for (uint32_t i; payload != NULL && (i = atomic_fetch_add(&r->next, 1)) < count;)
+        read_node(r->resume, i, payload);
     free(payload);
+}
+
+static void read_all(prep_resume *resume, prep_workers *workers)
+{
+    const mospt_hierarchy *h = &resume->dataset->hierarchy;
+    reading r = {.resume = resume, .largest = 1};
+    for (uint32_t i = 0; i < h->count; i++)
+        if (h->nodes[i].payload_size > r.largest) r.largest = (size_t)h->nodes[i].payload_size;
+    prep_workers_run(workers, prep_workers_count(workers), read_nodes, &r);
 }
 
 /* Sums up from the leaves: children stand after their parents. */
@@ -69,7 +94,7 @@ bool prep_resume_open(const char *path, uint64_t build, prep_workers *workers, p
         free(r);
         return mospt_err_nomem(err, count * sizeof *r->kept);
     }
-    prep_workers_run(workers, count, read_node, r);
+    read_all(r, workers);
     sum_up(r);
     *out = r;
     return true;
