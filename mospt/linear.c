@@ -87,16 +87,12 @@ static void sort_few(const mospt_linear_input *in, uint64_t *keys, uint32_t coun
     }
 }
 
-/* Sorts by the bytes of the records from `at` on: byte by byte, in place, since there may be as
- * many in one cell as a node can hold. */
-static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
+static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at);
+
+/* Byte by byte, in place, since there may be as many in one cell as a node can hold. */
+static void sort_many(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
 {
     uint32_t begin[UINT8_MAX + 2] = {0}, next[UINT8_MAX + 1];
-    if (at == in->records->stride || count < 2) return;
-    if (count <= FEW) {
-        sort_few(in, keys, count, at);
-        return;
-    }
     at = first_difference(in, keys, count, at);
     if (at == in->records->stride) return;
     for (uint32_t i = 0; i < count; i++)
@@ -115,6 +111,14 @@ static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t cou
         }
     for (uint32_t v = 0; v <= UINT8_MAX; v++)
         sort_cell(in, keys + begin[v], begin[v + 1] - begin[v], at + 1);
+}
+
+/* Sorts by the bytes of the records from `at` on. */
+static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
+{
+    if (at == in->records->stride || count < 2) return;
+    if (count <= FEW) sort_few(in, keys, count, at);
+    else sort_many(in, keys, count, at);
 }
 
 static uint32_t colour_of(const mospt_linear_input *in, uint64_t key)

@@ -142,12 +142,13 @@ static uint32_t count_before(const division *d, uint32_t piece)
 }
 
 /* Points that find their finest cell taken. */
-static uint32_t count_rejected(const uint64_t *keys, uint32_t count, uint32_t cell_shift)
+MOSPT_WIDE static uint32_t count_rejected(const uint64_t *keys, uint32_t count,
+                                          uint32_t cell_shift)
 {
-    uint32_t sum = 0;
+    uint64_t sum = 0;
     for (uint32_t i = 1; i < count; i++)
         sum += keys[i] >> cell_shift == keys[i - 1] >> cell_shift;
-    return sum;
+    return (uint32_t)sum;
 }
 
 /* Where keys go. */
