@@ -14,6 +14,8 @@
 #include "render/pace.h"
 #include "render/stage.h"
 #include "scripts/bench_flight.h"
+#include "scripts/bench_options.h"
+#include "scripts/bench_time.h"
 #include "scripts/plain_loop.h"
 
 #include <dirent.h>
@@ -21,13 +23,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 typedef struct {
-    const char *dataset;
-    rend_engine_options engine;
-    rend_view_of view;
+    bench_options common;
     double seconds, fps;
     uint64_t gpu_cache_bytes; /* 0: a tenth of the points */
 } options;
@@ -42,23 +41,10 @@ typedef struct {
     double *ms; /* [frames] */
 } bench;
 
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
 static void wait_until(double ms)
 {
-    double left = ms - now_ms();
+    double left = ms - bench_now_ms();
     if (left > 0) usleep((useconds_t)(left * 1e3));
-}
-
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 /* What has been written to the disk goes; the rest stays. */
@@ -78,18 +64,18 @@ static bool fly_frame(bench *b, uint32_t i, uint64_t *points, mospt_err *err)
 {
     rend_progress progress;
     rend_figures before, after;
-    rend_view_of view = b->o->view;
+    rend_view_of view = b->o->common.view;
     const rend_allowance allowed = {.upload_bytes = rend_pace_bytes(&b->pace)};
     uint64_t fits = rend_pace_points(&b->pace);
     float depth;
     view.camera = bench_flight_at(&b->flight, (i + 0.5) / b->frames, 0);
     if (view.budget_points > fits) view.budget_points = fits;
     rend_stage_figures(b->stage, &before);
-    double start = now_ms();
+    double start = bench_now_ms();
     if (!rend_stage_frame(b->stage, &view, &allowed, &progress, err) ||
         !rgl_read_depth(b->engine.gl, 0, 0, 0, &depth, err)) /* waits for all that was drawn */
         return false;
-    b->ms[i] = now_ms() - start;
+    b->ms[i] = bench_now_ms() - start;
     rend_stage_figures(b->stage, &after);
     *points = after.points_drawn;
     rend_pace_note(&b->pace, after.points_total - before.points_total,
@@ -100,7 +86,7 @@ static bool fly_frame(bench *b, uint32_t i, uint64_t *points, mospt_err *err)
 static void print_ms(bench *b, const char *name)
 {
     uint32_t n = b->frames;
-    qsort(b->ms, n, sizeof *b->ms, compare);
+    bench_sort(b->ms, n);
     double median = b->ms[n / 2], p99 = b->ms[n * 99 / 100];
     printf("%-6s %7u %8.1f %8.1f %6.2f %8.1f", name, n, median, p99, p99 / median, b->ms[n - 1]);
 }
@@ -108,14 +94,14 @@ static void print_ms(bench *b, const char *name)
 static bool fly(bench *b, const char *name, mospt_err *err)
 {
     rend_figures before, f = {0};
-    double points = 0, missing = 0, frame_ms = 1e3 / b->o->fps, next = now_ms();
+    double points = 0, missing = 0, frame_ms = 1e3 / b->o->fps, next = bench_now_ms();
     uint32_t late = 0, n = b->frames;
     rend_pace_init(&b->pace, b->o->fps);
     rend_stage_figures(b->stage, &before);
     for (uint32_t i = 0; i < n; i++) {
         uint64_t drawn;
         wait_until(next);
-        next = now_ms() + frame_ms;
+        next = bench_now_ms() + frame_ms;
         if (!fly_frame(b, i, &drawn, err)) return false;
         rend_stage_figures(b->stage, &f);
         points += (double)drawn, missing += f.pending, late += b->ms[i] > frame_ms;
@@ -132,7 +118,7 @@ static bool read_points(const bench *b, const mospt_dataset *dataset, mospt_vert
                         uint32_t *count, mospt_err *err)
 {
     const mospt_hierarchy *h = &dataset->hierarchy;
-    uint64_t most = b->o->view.budget_points;
+    uint64_t most = b->o->common.view.budget_points;
     *out = malloc(most * sizeof **out);
     if (*out == NULL) return mospt_err_nomem(err, most * sizeof **out);
     *count = 0;
@@ -145,11 +131,11 @@ static bool read_points(const bench *b, const mospt_dataset *dataset, mospt_vert
 
 static bool loop(bench *b, const mospt_dataset *dataset, mospt_err *err)
 {
-    const rend_view_of *v = &b->o->view;
+    const rend_view_of *v = &b->o->common.view;
     mospt_vertex *vertices = NULL;
     uint32_t count, low[3], high[3];
-    double frame_ms = 1e3 / b->o->fps, next = now_ms();
-    plain_loop *l = plain_loop_create(v->width, v->height, b->o->engine.threads);
+    double frame_ms = 1e3 / b->o->fps, next = bench_now_ms();
+    plain_loop *l = plain_loop_create(v->width, v->height, b->o->common.engine.threads);
     bool ok =
         (l != NULL || mospt_err_nomem(err, 0)) && read_points(b, dataset, &vertices, &count, err);
     rend_frame_bounds(dataset, low, high);
@@ -158,10 +144,10 @@ static bool loop(bench *b, const mospt_dataset *dataset, mospt_err *err)
         rend_camera camera = bench_flight_at(&b->flight, (i + 0.5) / b->frames, 0);
         rend_frame_make(&camera, &dataset->metadata.grid, low, high, v->width, v->height, &frame);
         wait_until(next);
-        double start = now_ms();
+        double start = bench_now_ms();
         next = start + frame_ms;
         plain_loop_draw(l, &frame, vertices, count);
-        b->ms[i] = now_ms() - start;
+        b->ms[i] = bench_now_ms() - start;
     }
     plain_loop_destroy(l);
     free(vertices);
@@ -172,23 +158,24 @@ static bool loop(bench *b, const mospt_dataset *dataset, mospt_err *err)
 static bool run(const options *o, mospt_err *err)
 {
     bench b = {.o = o, .frames = (uint32_t)(o->seconds * o->fps)};
+    const rend_view_of *v = &o->common.view;
     mospt_dataset *dataset = NULL;
     b.ms = calloc(b.frames, sizeof *b.ms);
     bool ok = (b.ms != NULL || mospt_err_nomem(err, b.frames * sizeof *b.ms)) &&
-              mospt_dataset_open(o->dataset, &dataset, err) &&
-              bench_flight_make(dataset, (double)o->view.width / o->view.height, &b.flight, err) &&
-              rend_engine_open(&o->engine, &b.engine, err);
+              mospt_dataset_open(o->common.dataset, &dataset, err) &&
+              bench_flight_make(dataset, (double)v->width / v->height, &b.flight, err) &&
+              rend_engine_open(&o->common.engine, &b.engine, err);
     if (ok) {
         uint64_t tenth = dataset->metadata.point_count * sizeof(mospt_vertex) / 10;
         const rend_limits limits = {.gpu_cache_bytes =
                                         o->gpu_cache_bytes > 0 ? o->gpu_cache_bytes : tenth};
         ok = rend_stage_create(dataset, b.engine.gl, &limits, NULL, NULL, &b.stage, err);
-        drop_from_cache(o->dataset);
+        drop_from_cache(o->common.dataset);
     }
     if (ok) {
         printf("%s, %ux%u, %.1f M points, budget %.1f M, %.0f frames a second\n",
-               rgl_renderer(b.engine.gl), o->view.width, o->view.height,
-               (double)dataset->metadata.point_count * 1e-6, (double)o->view.budget_points * 1e-6,
+               rgl_renderer(b.engine.gl), v->width, v->height,
+               (double)dataset->metadata.point_count * 1e-6, (double)v->budget_points * 1e-6,
                o->fps);
         printf("%-6s %7s %8s %8s %6s %8s %7s %7s %7s %8s %8s\n", "", "frames", "med ms", "p99 ms",
                "/med", "slowest", "late %", "M pts", "misses", "MB read", "MB up");
@@ -202,57 +189,28 @@ static bool run(const options *o, mospt_err *err)
     return ok;
 }
 
-static bool set_option(options *o, const char *name, const char *value)
+static int set(void *user, const char *name, const char *value)
 {
-    rend_view_of *v = &o->view;
+    options *o = user;
+    if (value == NULL) return 0;
     if (strcmp(name, "--seconds") == 0) o->seconds = atof(value);
     else if (strcmp(name, "--fps") == 0) o->fps = atof(value);
-    else if (strcmp(name, "--budget") == 0) v->budget_points = (uint64_t)atof(value);
-    else if (strcmp(name, "--threads") == 0) o->engine.threads = (uint32_t)atol(value);
     else if (strcmp(name, "--gpu-cache") == 0)
         o->gpu_cache_bytes = (uint64_t)atol(value) * REND_MIB;
-    else if (strcmp(name, "--size") == 0) return sscanf(value, "%ux%u", &v->width, &v->height) == 2;
-    else if (strcmp(name, "--renderer") == 0)
-        o->engine.renderer = strcmp(value, "gl") == 0 ? REND_RENDERER_GL : REND_RENDERER_CPU;
-    else if (strcmp(name, "--point-size") == 0) {
-        v->look.size_mode = strcmp(value, "auto") == 0 ? REND_SIZE_AUTO : REND_SIZE_FIXED;
-        v->look.point_px = (float)atof(value);
-    } else return false;
-    return true;
-}
-
-static bool parse(int argc, char **argv, options *o)
-{
-    for (int i = 1; i < argc; i++) {
-        if (strcmp(argv[i], "--no-edl") == 0) o->view.look.no_edl = true;
-        else if (strcmp(argv[i], "--no-occlusion") == 0) o->view.no_occlusion = true;
-        else if (argv[i][0] != '-') o->dataset = argv[i];
-        else if (i + 1 >= argc || !set_option(o, argv[i], argv[i + 1])) return false;
-        else i++;
-    }
-    return o->dataset != NULL && o->fps > 0 && o->seconds * o->fps >= 1 && o->view.width > 0 &&
-           o->view.height > 0 && o->view.budget_points > 0;
+    else return 0;
+    return 2;
 }
 
 int main(int argc, char **argv)
 {
-    options o = {.seconds = 40,
-                 .fps = 30,
-                 .engine = {.renderer = REND_RENDERER_CPU},
-                 .view = {.width = REND_WIDTH_DEFAULT,
-                          .height = REND_HEIGHT_DEFAULT,
-                          .look = {.size_mode = REND_SIZE_FIXED, .point_px = 1},
-                          .budget_points = 2000000}};
+    options o = {.common = bench_options_usual(), .seconds = 40, .fps = 30};
     mospt_err err = {0};
-    if (!parse(argc, argv, &o)) {
+    if (!bench_options_parse(argc, argv, set, &o, &o.common) || !(o.fps > 0) ||
+        !(o.seconds * o.fps >= 1)) {
         fprintf(stderr, "usage: bench_live DATASET [--seconds N] [--fps N] [--budget N] "
                         "[--size WxH] [--renderer gl|cpu] [--threads N] [--point-size PX|auto] "
                         "[--gpu-cache MIB] [--no-edl] [--no-occlusion]\n");
         return 2;
     }
-    if (run(&o, &err)) return 0;
-    char text[2048];
-    mospt_err_text(&err, text, sizeof text);
-    fprintf(stderr, "bench_live: %s\n", text);
-    return 1;
+    return run(&o, &err) ? 0 : bench_options_fail("bench_live", &err);
 }

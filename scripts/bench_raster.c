@@ -9,12 +9,12 @@
  * one-pixel points must be the plain loop's. */
 #include "render/cpu/cpu.h"
 #include "render/gl/context.h"
+#include "scripts/bench_time.h"
 #include "scripts/plain_loop.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 enum { WIDTH = 1280, HEIGHT = 720, RUNS_MAX = 99, RANGE_POINTS = 15000 };
 
@@ -27,13 +27,6 @@ typedef struct {
     rgl *cpu, *gl;
     plain_loop *plain;
 } bench;
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void need(bool ok, const mospt_err *err)
 {
@@ -125,29 +118,23 @@ static void verify(const bench *b)
     }
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
 static void measure(const bench *b, const char *view, uint32_t runs)
 {
-    double seconds[CASES][RUNS_MAX];
+    double ms[CASES][RUNS_MAX];
     verify(b);
     for (uint32_t r = 0; r < runs; r++)
         for (int c = 0; c < CASES; c++) {
             if (c == OPENGL && b->gl == NULL) continue;
-            double start = now_s();
+            double start = bench_now_ms();
             draw(b, (bench_case)c);
-            seconds[c][r] = now_s() - start;
+            ms[c][r] = bench_now_ms() - start;
         }
     for (int c = 0; c < CASES; c++) {
         if (c == OPENGL && b->gl == NULL) continue;
-        qsort(seconds[c], runs, sizeof seconds[c][0], compare);
-        double median = seconds[c][runs / 2];
+        bench_sort(ms[c], runs);
+        double median = ms[c][runs / 2];
         printf("%-8s %-15s %8.2f ms %8.1f M points/s %6.2f of the plain loop\n", view, NAMES[c],
-               1e3 * median, 1e-6 * b->count / median, seconds[PLAIN][runs / 2] / median);
+               median, 1e-3 * b->count / median, ms[PLAIN][runs / 2] / median);
     }
 }
 

@@ -7,6 +7,7 @@
  * with a little noise, intensity and colour. Reading goes through prep_scan_read(), as in the
  * builder, and must find every point. */
 #include "preprocess/scan.h"
+#include "scripts/bench_time.h"
 #include "tests/write_e57.h"
 #include "tests/write_las.h"
 #include "tests/write_laz.h"
@@ -17,7 +18,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { COLUMN_POINTS = 1000, RUNS_MAX = 100, LAS_HEADER = 227, LAS_RECORD = 26, LAZ_CHUNK = 50000 };
 
@@ -241,11 +241,10 @@ static bool use_processors(int count)
 
 static bool read_points(const char *path, uint64_t *count, double *seconds, mospt_err *err)
 {
-    struct timespec start, end;
     prep_batch batch = {0};
     prep_scan *scan;
     *count = 0;
-    clock_gettime(CLOCK_MONOTONIC, &start);
+    double start_ms = bench_now_ms();
     if (!prep_scan_open(path, 0, NULL, &scan, err)) return false;
     bool ok =
         prep_batch_init(&batch, &prep_scan_describe(scan)->attributes, PREP_BATCH_CAPACITY, err);
@@ -259,15 +258,8 @@ static bool read_points(const char *path, uint64_t *count, double *seconds, mosp
     }
     prep_batch_fini(&batch);
     prep_scan_close(scan);
-    clock_gettime(CLOCK_MONOTONIC, &end);
-    *seconds = (double)(end.tv_sec - start.tv_sec) + 1e-9 * (double)(end.tv_nsec - start.tv_nsec);
+    *seconds = (bench_now_ms() - start_ms) * 1e-3;
     return ok;
-}
-
-static int compare(const void *a, const void *b)
-{
-    const double *x = a, *y = b;
-    return (*x > *y) - (*x < *y);
 }
 
 static int run_read(const char *path, uint64_t expected, int runs, int cores)
@@ -291,7 +283,7 @@ static int run_read(const char *path, uint64_t expected, int runs, int cores)
                 expected);
         return 1;
     }
-    qsort(seconds, (size_t)runs, sizeof *seconds, compare);
+    bench_sort(seconds, (uint32_t)runs);
     printf("%.6f\n", seconds[runs / 2]);
     return 0;
 }

@@ -6,12 +6,12 @@
  * checked: within the budget, and spending nine tenths of it unless cells are down to a pixel. */
 #include "mospt/dataset.h"
 #include "render/select.h"
+#include "scripts/bench_time.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { BITS = 24, DEPTH = 7 };
 
@@ -20,13 +20,6 @@ typedef struct {
     uint32_t nodes, frames;
     uint64_t budget;
 } options;
-
-static double now_ms(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 /* Height of the hills, as a share of the root's width. */
 static double hill(double x, double y)
@@ -91,12 +84,6 @@ static void camera_at(double t, const double low[3], const double high[3], rend_
     }
 }
 
-static int compare(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static bool is_right(const rend_selection *s, uint64_t budget)
 {
     uint64_t sum = 0;
@@ -124,14 +111,14 @@ static bool run(const options *o, const mospt_hierarchy *tree, const mospt_grid 
                                          .frame = &frame,
                                          .budget_points = o->budget,
                                          .cell_px = 0.25f};
-        double start = now_ms();
+        double start = bench_now_ms();
         if (!rend_select_run(selector, &input, &s, err)) return false;
-        ms[i] = now_ms() - start;
+        ms[i] = bench_now_ms() - start;
         if (!is_right(s, o->budget))
             return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(), "frame %u is wrong", i);
         points += (double)s->points, draws += s->draw_count, looked += s->visited;
     }
-    qsort(ms, o->frames, sizeof *ms, compare);
+    bench_sort(ms, o->frames);
     printf("nodes %u  budget %.1f M  selected %.1f M points in %.0f nodes of %.0f looked at\n",
            tree->count, (double)o->budget * 1e-6, points / o->frames * 1e-6, draws / o->frames,
            looked / o->frames);
