@@ -64,6 +64,17 @@ static uint64_t word_at(const mospt_linear_input *in, uint64_t key, size_t at)
     return __builtin_bswap64(word);
 }
 
+/* Two, as most cells have that have several: which of them comes first no processor can foretell. */
+static void sort_two(const mospt_linear_input *in, uint64_t *keys, size_t at)
+{
+    uint64_t a = keys[0], b = keys[1], first = word_at(in, a, at), second = word_at(in, b, at);
+    bool turned = second < first;
+    if (first == second)
+        turned = memcmp(record_of(in, a) + at, record_of(in, b) + at, in->records->stride - at) > 0;
+    keys[0] = turned ? b : a;
+    keys[1] = turned ? a : b;
+}
+
 /* All records are alike before `at`, so a word that begins earlier decides as well. Words are taken
  * first, since records stand anywhere, and the waits for them overlap. */
 static void sort_few(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
@@ -117,7 +128,8 @@ static void sort_many(const mospt_linear_input *in, uint64_t *keys, uint32_t cou
 static void sort_cell(const mospt_linear_input *in, uint64_t *keys, uint32_t count, size_t at)
 {
     if (at == in->records->stride || count < 2) return;
-    if (count <= FEW) sort_few(in, keys, count, at);
+    if (count == 2) sort_two(in, keys, at);
+    else if (count <= FEW) sort_few(in, keys, count, at);
     else sort_many(in, keys, count, at);
 }
 
@@ -188,7 +200,6 @@ static uint32_t enter_cell(linear *l, uint64_t *keys, uint32_t begin, uint32_t e
 {
     if (end - begin == 1) return begin;
     sort_cell(l->in, keys + begin, end - begin, 0);
-    memset(l->level + begin, (int)l->in->depth + 1, end - begin);
     return begin + choose_key(l->in, keys + begin, end - begin);
 }
 
@@ -252,9 +263,11 @@ static void end_depth(linear *l, uint32_t level)
     l->standing = to;
 }
 
-/* Gives every point its level: that of the last depth at which it stood for a cell. */
+/* Gives every point its level: that of the last depth at which it stood for a cell, or one more than
+ * there are. */
 static void assign_levels(linear *l, uint64_t *keys, uint32_t count)
 {
+    memset(l->level, (int)l->in->depth + 1, count);
     enter_cells(l, keys, count);
     for (uint32_t level = l->in->depth; level > 0; level--)
         end_depth(l, level);

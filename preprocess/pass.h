@@ -21,7 +21,7 @@
 
 enum {
     PREP_PASS_LEVELS_MAX = 3,
-    PREP_PASS_SLICE = 8192, /* records that one thread prepares at a time: they fit its cache */
+    PREP_PASS_SLICE = 4096, /* records that one thread prepares at a time: they fit its cache */
 };
 
 /* Told now and then, by one thread at a time. Returns false to stop the build. */

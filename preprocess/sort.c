@@ -71,6 +71,41 @@ static bool make_places(uint32_t *counts, uint32_t values, uint32_t alike, uint3
     return true;
 }
 
+/* Counts all digits at once: place[] has those of each after those of the one before. */
+static inline void count_digits(const uint64_t *keys, uint32_t count, uint32_t low_bit,
+                                uint32_t digit_bits, uint32_t digits, uint32_t *place)
+{
+    uint32_t values = 1u << digit_bits;
+    for (uint32_t i = 0; i < count; i++) {
+        uint64_t key = keys[i] >> low_bit;
+        for (uint32_t d = 0; d < digits; d++, key >>= digit_bits)
+            place[d * values + (uint32_t)(key & (values - 1))]++;
+    }
+}
+
+/* With constants for the usual numbers of digits, so that there is no inner loop. */
+static void count_any_digits(const uint64_t *keys, uint32_t count, uint32_t low_bit,
+                             uint32_t digit_bits, uint32_t digits, uint32_t *place)
+{
+    memset(place, 0, (digits << digit_bits) * sizeof *place);
+    switch (digits) {
+    case 1:
+        count_digits(keys, count, low_bit, digit_bits, 1, place);
+        break;
+    case 2:
+        count_digits(keys, count, low_bit, digit_bits, 2, place);
+        break;
+    case 3:
+        count_digits(keys, count, low_bit, digit_bits, 3, place);
+        break;
+    case 4:
+        count_digits(keys, count, low_bit, digit_bits, 4, place);
+        break;
+    default:
+        count_digits(keys, count, low_bit, digit_bits, digits, place);
+    }
+}
+
 /* Least digit first. Returns true if the result is in `other`. */
 static bool sort_by_digits(uint64_t *keys, uint64_t *other, uint32_t count, uint32_t low_bit,
                            uint32_t end_bit)
@@ -79,10 +114,7 @@ static bool sort_by_digits(uint64_t *keys, uint64_t *other, uint32_t count, uint
                               values = 1u << digit_bits, mask = values - 1;
     uint32_t digits = (end_bit - low_bit + digit_bits - 1) / digit_bits;
     uint64_t *from = keys, *to = other;
-    memset(place, 0, digits * values * sizeof *place);
-    for (uint32_t i = 0; i < count; i++)
-        for (uint32_t d = 0; d < digits; d++)
-            place[d * values + (uint32_t)(keys[i] >> (low_bit + d * digit_bits) & mask)]++;
+    count_any_digits(keys, count, low_bit, digit_bits, digits, place);
     for (uint32_t d = 0; d < digits; d++) {
         uint32_t shift = low_bit + d * digit_bits, *at = place + d * values;
         if (!make_places(at, values, (uint32_t)(from[0] >> shift & mask), count)) continue;
