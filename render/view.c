@@ -5,8 +5,8 @@
 #include "render/gl/window.h"
 #include "render/hud.h"
 #include "render/image.h"
+#include "render/motion.h"
 #include "render/orbit.h"
-#include "render/pace.h"
 #include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
@@ -22,11 +22,7 @@
 enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
 #define STOP_ASKED_S 0.25       /* between two looks at whether to stop */
-#define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
 #define WATCH_S 1.0             /* between two looks at whether the dataset has changed */
-#define AHEAD_S 0.5             /* how far the camera's motion is thought on */
-#define TRAVEL_S 1.0            /* one that moved for longer is somewhere else */
-#define FULLER 4                /* how many times as many points the next picture at rest has */
 #define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
 #define FLY_FASTER 4
 #define ZOOM_PER_STEP 0.85
@@ -61,13 +57,8 @@ typedef struct {
 
     atomic_bool loaded; /* set by the loader's threads: the next frame shows more */
     rend_progress progress;
-    double flown_at;   /* seconds; 0: not flying */
-    double moved_at;   /* seconds; 0: the camera rests */
-    double set_out_at; /* seconds: since when it has moved */
-    rend_camera drawn; /* in the frame before, while the camera moved */
-    double drawn_at;   /* 0: it rested */
-    rend_pace pace;
-    uint64_t rest_points; /* budget of the pictures at rest, which grows with each; 0: not begun */
+    double flown_at; /* seconds; 0: not flying */
+    rend_motion motion;
     double frame_ms, notice_until;
     char notice[1200];
     rend_view_result result;
@@ -115,9 +106,7 @@ static bool point_at(viewer *v, double x, double y, double out[3])
 
 static void touch_camera(viewer *v)
 {
-    double now = rgl_window_seconds();
-    if (v->moved_at == 0) v->set_out_at = now;
-    v->moved_at = now;
+    rend_motion_touch(&v->motion, rgl_window_seconds());
     v->dirty = true;
 }
 
@@ -228,7 +217,7 @@ static void scale_budget(viewer *v, double factor)
     budget = fmax(budget * factor, (double)BUDGET_MIN);
     v->view.budget_points = budget >= (double)total && factor > 1 ? REND_ALL : (uint64_t)budget;
     v->budget_changed = true;
-    v->rest_points = 0;
+    rend_motion_restart(&v->motion);
 }
 
 static void scale_points(viewer *v, float step)
@@ -444,57 +433,18 @@ static bool draw_words(viewer *v, mospt_err *err)
            rend_strip_draw(&v->strip, v->text, v->view.width, v->view.height, err);
 }
 
-/* Pictures at rest have more and more points, so that the first one is there soon. After a small
- * movement they go on with as many as there were before it. */
-static uint64_t rest_budget(viewer *v)
-{
-    uint64_t first = FULLER * rend_pace_points(&v->pace);
-    if (v->rest_points < first) v->rest_points = first;
-    return v->rest_points < v->view.budget_points ? v->rest_points : v->view.budget_points;
-}
-
-/* True if the picture at rest, which is done, can be followed by a fuller one. */
-static bool grow_rest_budget(viewer *v)
-{
-    rend_figures figures;
-    rend_stage_figures(v->stage, &figures);
-    if (figures.pending > 0 || !figures.budget_spent) return false;
-    if (v->rest_points >= v->view.budget_points) return false;
-    v->rest_points = v->rest_points < REND_ALL / FULLER ? v->rest_points * FULLER : REND_ALL;
-    return true;
-}
-
-/* Where the camera will be if it moves on as it does; false while it rests. */
-static bool think_ahead(viewer *v, bool moves, rend_camera *ahead)
-{
-    double now = rgl_window_seconds(), elapsed = now - v->drawn_at;
-    bool known = moves && v->drawn_at > 0 && elapsed > 0 && elapsed < AHEAD_S;
-    *ahead = v->view.camera;
-    for (int a = 0; known && a < 3; a++) {
-        ahead->eye[a] += (ahead->eye[a] - v->drawn.eye[a]) * AHEAD_S / elapsed;
-        ahead->target[a] += (ahead->target[a] - v->drawn.target[a]) * AHEAD_S / elapsed;
-    }
-    v->drawn = v->view.camera;
-    v->drawn_at = moves ? now : 0;
-    return known;
-}
-
 /* While the camera moves, a frame is as much as fits into its time. At rest it draws so much of a
  * picture that may be larger. The last one before the window closes is whole. */
 static bool draw_points(viewer *v, bool last, mospt_err *err)
 {
-    uint64_t fits = rend_pace_points(&v->pace);
     rend_view_of view = v->view;
-    rend_allowance allowed = {.points = fits, .upload_bytes = rend_pace_bytes(&v->pace)};
-    bool moves = v->moved_at > 0 && !last;
-    rend_camera ahead;
-    if (think_ahead(v, moves, &ahead)) allowed.ahead = &ahead;
-    if (moves && view.budget_points > fits) view.budget_points = fits;
-    if (!moves && !last) view.budget_points = rest_budget(v);
-    if (moves || last) allowed.points = 0;
+    rend_allowance allowed;
+    rend_figures figures;
+    bool rests = rend_motion_plan(&v->motion, last, rgl_window_seconds(), &view, &allowed);
     if (!rend_stage_frame(v->stage, &view, &allowed, &v->progress, err)) return false;
-    if (!moves && !last && v->progress != REND_PART && grow_rest_budget(v))
-        v->progress = REND_AGAIN;
+    if (!rests || v->progress == REND_PART) return true;
+    rend_stage_figures(v->stage, &figures);
+    if (rend_motion_grow(&v->motion, &figures, v->view.budget_points)) v->progress = REND_AGAIN;
     return true;
 }
 
@@ -518,7 +468,7 @@ static void count_frame(viewer *v, const rend_figures *before, double ms)
 {
     rend_figures now;
     rend_stage_figures(v->stage, &now);
-    rend_pace_note(&v->pace, now.points_total - before->points_total,
+    rend_pace_note(&v->motion.pace, now.points_total - before->points_total,
                    now.uploaded_bytes - before->uploaded_bytes, v->progress != REND_PART, ms);
     v->frame_ms = ms;
     v->result.mean_ms += ms; /* the sum as yet */
@@ -565,18 +515,9 @@ static bool is_due(const viewer *v)
 static double rest(const viewer *v)
 {
     if (is_due(v)) return 0;
-    if (v->moved_at > 0) return fmax(v->moved_at + MOVING_S - rgl_window_seconds(), 0.001);
+    double moving = rend_motion_wait(&v->motion, rgl_window_seconds());
+    if (moving > 0) return moving;
     return v->notice[0] != '\0' ? fmax(v->notice_until - rgl_window_seconds(), 0.01) : -1;
-}
-
-/* After a movement fuller pictures are owed. */
-static void come_to_rest(viewer *v)
-{
-    bool held = v->drag != DRAG_NONE && rgl_window_seconds() < v->moved_at + 3 * MOVING_S;
-    if (v->moved_at == 0 || held || rgl_window_seconds() < v->moved_at + MOVING_S) return;
-    if (v->moved_at > v->set_out_at + TRAVEL_S) v->rest_points = 0;
-    v->moved_at = 0;
-    v->dirty = true;
 }
 
 /* ---- a dataset that changes ---- */
@@ -673,7 +614,8 @@ static bool run(viewer *v, mospt_err *err)
         play(v);
         if (!watch(v, err)) return false;
         tell_faults(v);
-        come_to_rest(v);
+        if (rend_motion_settle(&v->motion, v->drag != DRAG_NONE, rgl_window_seconds()))
+            v->dirty = true;
         if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
             v->notice[0] = '\0', v->dirty = true;
         if (is_due(v) && !frame(v, err)) return false;
@@ -689,7 +631,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
 {
     const rend_view_options *o = v->options;
     memset(&v->view, 0, sizeof v->view); /* to the last byte: views are compared */
-    rend_pace_init(&v->pace, o->fps > 0 ? o->fps : REND_FPS_DEFAULT);
+    rend_motion_init(&v->motion, o->fps > 0 ? o->fps : REND_FPS_DEFAULT);
     v->view.look = o->look;
     v->view.no_occlusion = o->limits.no_occlusion;
     v->view.budget_points =
