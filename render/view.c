@@ -5,9 +5,9 @@
 #include "render/gl/window.h"
 #include "render/hud.h"
 #include "render/image.h"
+#include "render/look.h"
 #include "render/motion.h"
 #include "render/orbit.h"
-#include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
 #include "render/watch.h"
@@ -122,17 +122,9 @@ static void start_drag(viewer *v, const rgl_event *e)
 /* What is seen, as a keyframe: with what was changed since the window opened. */
 static rend_key key_of_view(const viewer *v)
 {
-    const rend_look *look = &v->view.look;
     rend_key key = {.camera = v->view.camera,
                     .budget_points = v->budget_changed ? v->view.budget_points : 0};
-    if (!rend_scheme_same(look, &v->options->look))
-        snprintf(key.colour, sizeof key.colour, "%s",
-                 look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute
-                                                       : rend_choice_name(look->colour));
-    key.clip = look->has_clip ? look->clip : rend_clip_open();
-    key.has_clip =
-        look->has_clip != v->options->look.has_clip ||
-        (look->has_clip && memcmp(&look->clip, &v->options->look.clip, sizeof look->clip) != 0);
+    rend_look_keep(&v->view.look, &v->options->look, &key);
     return key;
 }
 
@@ -143,20 +135,13 @@ static void tell_of_strip(viewer *v)
     v->dirty = true;
 }
 
-/* colour   NULL or "": as it is
- * clip     NULL: as when the window opened */
+/* As rend_look_recall(). */
 static void look_through(viewer *v, const rend_camera *camera, const char *colour,
                          const rend_box *clip)
 {
     if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
     v->view.camera = *camera;
-    for (uint32_t i = 0; colour != NULL && i < v->choice_count; i++) {
-        if (strcmp(rend_choice_text(&v->choices[i]), colour) != 0) continue;
-        v->view.look.colour = v->choices[i].colour;
-        v->view.look.attribute = v->choices[i].attribute;
-    }
-    v->view.look.has_clip = clip != NULL || v->options->look.has_clip;
-    v->view.look.clip = clip != NULL ? *clip : v->options->look.clip;
+    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->choices, v->choice_count);
     tell_of_strip(v);
 }
 
@@ -220,15 +205,6 @@ static void scale_budget(viewer *v, double factor)
     rend_motion_restart(&v->motion);
 }
 
-static void scale_points(viewer *v, float step)
-{
-    rend_look *look = &v->view.look;
-    float now = look->size_mode == REND_SIZE_FIXED ? fmaxf(look->point_px, 1) : 1;
-    if (look->size_mode == REND_SIZE_FIXED || step > 0) now += step;
-    look->size_mode = REND_SIZE_FIXED;
-    look->point_px = fminf(fmaxf(now, 1), 32);
-}
-
 static void save_picture(viewer *v)
 {
     char name[64], text[1100];
@@ -260,51 +236,22 @@ static void show_colours(viewer *v, const rend_look *look)
     else tell(v, err.message);
 }
 
-/* Keys that change what colours show. */
-static void press_colour_key(viewer *v, int key, bool shift)
-{
-    rend_look look = v->view.look;
-    double brightness = look.brightness > 0 ? look.brightness : 1;
-    if (key == 'C') {
-        rend_choice_step(v->choices, v->choice_count, shift ? -1 : 1, &look);
-    } else if (key >= '1' && key <= '9') {
-        rend_choice_read(rend_choice_name((rend_colour)(key - '1')), &look);
-        look.has_range = false, look.map = REND_MAP_USUAL;
-    } else if (key == 'M') {
-        look.map = (rend_map)(rend_choice_map(&look) % (REND_MAP_COUNT - 1) + 1);
-    } else if (key == ',' || key == '.') {
-        look.brightness = brightness * (key == '.' ? 1.25 : 0.8);
-    } else {
-        return;
-    }
-    show_colours(v, &look);
-}
-
-/* Keys that change how points look. */
+/* Keys that change how points look and what their colours show. */
 static void press_look_key(viewer *v, int key, bool shift)
 {
-    rend_look *look = &v->view.look;
-    if (key == '+') scale_points(v, 1);
-    else if (key == '-') scale_points(v, -1);
-    else if (key == '0') look->size_mode = REND_SIZE_AUTO;
-    else if (key == 'K') v->no_legend = !v->no_legend;
-    else if (!rend_shading_press(look, key, shift)) press_colour_key(v, key, shift);
+    rend_look look = v->view.look;
+    if (key == 'K') v->no_legend = !v->no_legend;
+    else if (rend_look_press(&v->view.look, key, shift)) return;
+    else if (rend_look_press_colour(&look, key, shift, v->choices, v->choice_count))
+        show_colours(v, &look);
 }
 
-/* Looks into the site: what is in front of the point under the cursor goes, along the axis that the
- * eye looks along most. */
 static void cut(viewer *v, bool undo)
 {
-    rend_look *look = &v->view.look;
-    double place[3], right[3], up[3], back[3];
-    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place)) {
+    double place[3];
+    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place))
         tell(v, "nothing to cut at under the cursor");
-        return;
-    }
-    if (!look->has_clip || undo) look->clip = rend_clip_open();
-    look->has_clip = !undo;
-    rend_camera_axes(&v->view.camera, right, up, back);
-    if (!undo) rend_clip_cut(back, place, &look->clip);
+    else rend_look_cut(&v->view.look, &v->view.camera, undo ? NULL : place);
 }
 
 static void change_lens(viewer *v, double factor)
@@ -412,21 +359,14 @@ static void fit_text(viewer *v)
 
 static bool draw_words(viewer *v, mospt_err *err)
 {
-    char look[160], shading[96];
-    const rend_look *l = &v->view.look;
+    char look[160];
     rend_hud hud = {.frame_ms = v->frame_ms,
                     .budget_points = v->view.budget_points,
                     .notice = v->notice,
                     .help = v->help};
-    const char *colours =
-        l->colour == REND_COLOUR_ATTRIBUTE ? l->attribute : rend_choice_name(l->colour);
     if (v->text == NULL) return true;
-    rend_shading_text(l, shading, sizeof shading);
+    rend_look_text(&v->view.look, look, sizeof look);
     if (!v->no_legend) hud.legend = rend_stage_legend(v->stage);
-    if (l->size_mode == REND_SIZE_FIXED)
-        snprintf(look, sizeof look, "%s  %g px  %s", colours, (double)fmaxf(l->point_px, 1),
-                 shading);
-    else snprintf(look, sizeof look, "%s  %s", colours, shading);
     hud.look = look;
     rend_stage_figures(v->stage, &hud.figures);
     return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err) &&
