@@ -5,9 +5,9 @@
 #include "render/gl/window.h"
 #include "render/hud.h"
 #include "render/image.h"
+#include "render/look.h"
+#include "render/motion.h"
 #include "render/orbit.h"
-#include "render/pace.h"
-#include "render/shading.h"
 #include "render/stage.h"
 #include "render/strip.h"
 #include "render/watch.h"
@@ -22,11 +22,7 @@
 enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
 #define STOP_ASKED_S 0.25       /* between two looks at whether to stop */
-#define MOVING_S 0.2            /* a camera that has not been touched for so long rests */
 #define WATCH_S 1.0             /* between two looks at whether the dataset has changed */
-#define AHEAD_S 0.5             /* how far the camera's motion is thought on */
-#define TRAVEL_S 1.0            /* one that moved for longer is somewhere else */
-#define FULLER 4                /* how many times as many points the next picture at rest has */
 #define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
 #define FLY_FASTER 4
 #define ZOOM_PER_STEP 0.85
@@ -61,13 +57,8 @@ typedef struct {
 
     atomic_bool loaded; /* set by the loader's threads: the next frame shows more */
     rend_progress progress;
-    double flown_at;   /* seconds; 0: not flying */
-    double moved_at;   /* seconds; 0: the camera rests */
-    double set_out_at; /* seconds: since when it has moved */
-    rend_camera drawn; /* in the frame before, while the camera moved */
-    double drawn_at;   /* 0: it rested */
-    rend_pace pace;
-    uint64_t rest_points; /* budget of the pictures at rest, which grows with each; 0: not begun */
+    double flown_at; /* seconds; 0: not flying */
+    rend_motion motion;
     double frame_ms, notice_until;
     char notice[1200];
     rend_view_result result;
@@ -115,9 +106,7 @@ static bool point_at(viewer *v, double x, double y, double out[3])
 
 static void touch_camera(viewer *v)
 {
-    double now = rgl_window_seconds();
-    if (v->moved_at == 0) v->set_out_at = now;
-    v->moved_at = now;
+    rend_motion_touch(&v->motion, rgl_window_seconds());
     v->dirty = true;
 }
 
@@ -133,17 +122,9 @@ static void start_drag(viewer *v, const rgl_event *e)
 /* What is seen, as a keyframe: with what was changed since the window opened. */
 static rend_key key_of_view(const viewer *v)
 {
-    const rend_look *look = &v->view.look;
     rend_key key = {.camera = v->view.camera,
                     .budget_points = v->budget_changed ? v->view.budget_points : 0};
-    if (!rend_scheme_same(look, &v->options->look))
-        snprintf(key.colour, sizeof key.colour, "%s",
-                 look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute
-                                                       : rend_choice_name(look->colour));
-    key.clip = look->has_clip ? look->clip : rend_clip_open();
-    key.has_clip =
-        look->has_clip != v->options->look.has_clip ||
-        (look->has_clip && memcmp(&look->clip, &v->options->look.clip, sizeof look->clip) != 0);
+    rend_look_keep(&v->view.look, &v->options->look, &key);
     return key;
 }
 
@@ -154,20 +135,13 @@ static void tell_of_strip(viewer *v)
     v->dirty = true;
 }
 
-/* colour   NULL or "": as it is
- * clip     NULL: as when the window opened */
+/* As rend_look_recall(). */
 static void look_through(viewer *v, const rend_camera *camera, const char *colour,
                          const rend_box *clip)
 {
     if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
     v->view.camera = *camera;
-    for (uint32_t i = 0; colour != NULL && i < v->choice_count; i++) {
-        if (strcmp(rend_choice_text(&v->choices[i]), colour) != 0) continue;
-        v->view.look.colour = v->choices[i].colour;
-        v->view.look.attribute = v->choices[i].attribute;
-    }
-    v->view.look.has_clip = clip != NULL || v->options->look.has_clip;
-    v->view.look.clip = clip != NULL ? *clip : v->options->look.clip;
+    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->choices, v->choice_count);
     tell_of_strip(v);
 }
 
@@ -228,16 +202,7 @@ static void scale_budget(viewer *v, double factor)
     budget = fmax(budget * factor, (double)BUDGET_MIN);
     v->view.budget_points = budget >= (double)total && factor > 1 ? REND_ALL : (uint64_t)budget;
     v->budget_changed = true;
-    v->rest_points = 0;
-}
-
-static void scale_points(viewer *v, float step)
-{
-    rend_look *look = &v->view.look;
-    float now = look->size_mode == REND_SIZE_FIXED ? fmaxf(look->point_px, 1) : 1;
-    if (look->size_mode == REND_SIZE_FIXED || step > 0) now += step;
-    look->size_mode = REND_SIZE_FIXED;
-    look->point_px = fminf(fmaxf(now, 1), 32);
+    rend_motion_restart(&v->motion);
 }
 
 static void save_picture(viewer *v)
@@ -271,51 +236,22 @@ static void show_colours(viewer *v, const rend_look *look)
     else tell(v, err.message);
 }
 
-/* Keys that change what colours show. */
-static void press_colour_key(viewer *v, int key, bool shift)
-{
-    rend_look look = v->view.look;
-    double brightness = look.brightness > 0 ? look.brightness : 1;
-    if (key == 'C') {
-        rend_choice_step(v->choices, v->choice_count, shift ? -1 : 1, &look);
-    } else if (key >= '1' && key <= '9') {
-        rend_choice_read(rend_choice_name((rend_colour)(key - '1')), &look);
-        look.has_range = false, look.map = REND_MAP_USUAL;
-    } else if (key == 'M') {
-        look.map = (rend_map)(rend_choice_map(&look) % (REND_MAP_COUNT - 1) + 1);
-    } else if (key == ',' || key == '.') {
-        look.brightness = brightness * (key == '.' ? 1.25 : 0.8);
-    } else {
-        return;
-    }
-    show_colours(v, &look);
-}
-
-/* Keys that change how points look. */
+/* Keys that change how points look and what their colours show. */
 static void press_look_key(viewer *v, int key, bool shift)
 {
-    rend_look *look = &v->view.look;
-    if (key == '+') scale_points(v, 1);
-    else if (key == '-') scale_points(v, -1);
-    else if (key == '0') look->size_mode = REND_SIZE_AUTO;
-    else if (key == 'K') v->no_legend = !v->no_legend;
-    else if (!rend_shading_press(look, key, shift)) press_colour_key(v, key, shift);
+    rend_look look = v->view.look;
+    if (key == 'K') v->no_legend = !v->no_legend;
+    else if (rend_look_press(&v->view.look, key, shift)) return;
+    else if (rend_look_press_colour(&look, key, shift, v->choices, v->choice_count))
+        show_colours(v, &look);
 }
 
-/* Looks into the site: what is in front of the point under the cursor goes, along the axis that the
- * eye looks along most. */
 static void cut(viewer *v, bool undo)
 {
-    rend_look *look = &v->view.look;
-    double place[3], right[3], up[3], back[3];
-    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place)) {
+    double place[3];
+    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place))
         tell(v, "nothing to cut at under the cursor");
-        return;
-    }
-    if (!look->has_clip || undo) look->clip = rend_clip_open();
-    look->has_clip = !undo;
-    rend_camera_axes(&v->view.camera, right, up, back);
-    if (!undo) rend_clip_cut(back, place, &look->clip);
+    else rend_look_cut(&v->view.look, &v->view.camera, undo ? NULL : place);
 }
 
 static void change_lens(viewer *v, double factor)
@@ -423,78 +359,32 @@ static void fit_text(viewer *v)
 
 static bool draw_words(viewer *v, mospt_err *err)
 {
-    char look[160], shading[96];
-    const rend_look *l = &v->view.look;
+    char look[160];
     rend_hud hud = {.frame_ms = v->frame_ms,
                     .budget_points = v->view.budget_points,
                     .notice = v->notice,
                     .help = v->help};
-    const char *colours =
-        l->colour == REND_COLOUR_ATTRIBUTE ? l->attribute : rend_choice_name(l->colour);
     if (v->text == NULL) return true;
-    rend_shading_text(l, shading, sizeof shading);
+    rend_look_text(&v->view.look, look, sizeof look);
     if (!v->no_legend) hud.legend = rend_stage_legend(v->stage);
-    if (l->size_mode == REND_SIZE_FIXED)
-        snprintf(look, sizeof look, "%s  %g px  %s", colours, (double)fmaxf(l->point_px, 1),
-                 shading);
-    else snprintf(look, sizeof look, "%s  %s", colours, shading);
     hud.look = look;
     rend_stage_figures(v->stage, &hud.figures);
     return rend_hud_draw(v->text, &hud, v->view.width, v->view.height, err) &&
            rend_strip_draw(&v->strip, v->text, v->view.width, v->view.height, err);
 }
 
-/* Pictures at rest have more and more points, so that the first one is there soon. After a small
- * movement they go on with as many as there were before it. */
-static uint64_t rest_budget(viewer *v)
-{
-    uint64_t first = FULLER * rend_pace_points(&v->pace);
-    if (v->rest_points < first) v->rest_points = first;
-    return v->rest_points < v->view.budget_points ? v->rest_points : v->view.budget_points;
-}
-
-/* True if the picture at rest, which is done, can be followed by a fuller one. */
-static bool grow_rest_budget(viewer *v)
-{
-    rend_figures figures;
-    rend_stage_figures(v->stage, &figures);
-    if (figures.pending > 0 || !figures.budget_spent) return false;
-    if (v->rest_points >= v->view.budget_points) return false;
-    v->rest_points = v->rest_points < REND_ALL / FULLER ? v->rest_points * FULLER : REND_ALL;
-    return true;
-}
-
-/* Where the camera will be if it moves on as it does; false while it rests. */
-static bool think_ahead(viewer *v, bool moves, rend_camera *ahead)
-{
-    double now = rgl_window_seconds(), elapsed = now - v->drawn_at;
-    bool known = moves && v->drawn_at > 0 && elapsed > 0 && elapsed < AHEAD_S;
-    *ahead = v->view.camera;
-    for (int a = 0; known && a < 3; a++) {
-        ahead->eye[a] += (ahead->eye[a] - v->drawn.eye[a]) * AHEAD_S / elapsed;
-        ahead->target[a] += (ahead->target[a] - v->drawn.target[a]) * AHEAD_S / elapsed;
-    }
-    v->drawn = v->view.camera;
-    v->drawn_at = moves ? now : 0;
-    return known;
-}
-
 /* While the camera moves, a frame is as much as fits into its time. At rest it draws so much of a
  * picture that may be larger. The last one before the window closes is whole. */
 static bool draw_points(viewer *v, bool last, mospt_err *err)
 {
-    uint64_t fits = rend_pace_points(&v->pace);
     rend_view_of view = v->view;
-    rend_allowance allowed = {.points = fits, .upload_bytes = rend_pace_bytes(&v->pace)};
-    bool moves = v->moved_at > 0 && !last;
-    rend_camera ahead;
-    if (think_ahead(v, moves, &ahead)) allowed.ahead = &ahead;
-    if (moves && view.budget_points > fits) view.budget_points = fits;
-    if (!moves && !last) view.budget_points = rest_budget(v);
-    if (moves || last) allowed.points = 0;
+    rend_allowance allowed;
+    rend_figures figures;
+    bool rests = rend_motion_plan(&v->motion, last, rgl_window_seconds(), &view, &allowed);
     if (!rend_stage_frame(v->stage, &view, &allowed, &v->progress, err)) return false;
-    if (!moves && !last && v->progress != REND_PART && grow_rest_budget(v))
-        v->progress = REND_AGAIN;
+    if (!rests || v->progress == REND_PART) return true;
+    rend_stage_figures(v->stage, &figures);
+    if (rend_motion_grow(&v->motion, &figures, v->view.budget_points)) v->progress = REND_AGAIN;
     return true;
 }
 
@@ -518,7 +408,7 @@ static void count_frame(viewer *v, const rend_figures *before, double ms)
 {
     rend_figures now;
     rend_stage_figures(v->stage, &now);
-    rend_pace_note(&v->pace, now.points_total - before->points_total,
+    rend_pace_note(&v->motion.pace, now.points_total - before->points_total,
                    now.uploaded_bytes - before->uploaded_bytes, v->progress != REND_PART, ms);
     v->frame_ms = ms;
     v->result.mean_ms += ms; /* the sum as yet */
@@ -565,18 +455,9 @@ static bool is_due(const viewer *v)
 static double rest(const viewer *v)
 {
     if (is_due(v)) return 0;
-    if (v->moved_at > 0) return fmax(v->moved_at + MOVING_S - rgl_window_seconds(), 0.001);
+    double moving = rend_motion_wait(&v->motion, rgl_window_seconds());
+    if (moving > 0) return moving;
     return v->notice[0] != '\0' ? fmax(v->notice_until - rgl_window_seconds(), 0.01) : -1;
-}
-
-/* After a movement fuller pictures are owed. */
-static void come_to_rest(viewer *v)
-{
-    bool held = v->drag != DRAG_NONE && rgl_window_seconds() < v->moved_at + 3 * MOVING_S;
-    if (v->moved_at == 0 || held || rgl_window_seconds() < v->moved_at + MOVING_S) return;
-    if (v->moved_at > v->set_out_at + TRAVEL_S) v->rest_points = 0;
-    v->moved_at = 0;
-    v->dirty = true;
 }
 
 /* ---- a dataset that changes ---- */
@@ -673,7 +554,8 @@ static bool run(viewer *v, mospt_err *err)
         play(v);
         if (!watch(v, err)) return false;
         tell_faults(v);
-        come_to_rest(v);
+        if (rend_motion_settle(&v->motion, v->drag != DRAG_NONE, rgl_window_seconds()))
+            v->dirty = true;
         if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
             v->notice[0] = '\0', v->dirty = true;
         if (is_due(v) && !frame(v, err)) return false;
@@ -689,7 +571,7 @@ static bool open_viewer(viewer *v, mospt_err *err)
 {
     const rend_view_options *o = v->options;
     memset(&v->view, 0, sizeof v->view); /* to the last byte: views are compared */
-    rend_pace_init(&v->pace, o->fps > 0 ? o->fps : REND_FPS_DEFAULT);
+    rend_motion_init(&v->motion, o->fps > 0 ? o->fps : REND_FPS_DEFAULT);
     v->view.look = o->look;
     v->view.no_occlusion = o->limits.no_occlusion;
     v->view.budget_points =

@@ -1,0 +1,90 @@
+#include "render/look.h"
+
+#include "render/clip.h"
+#include "render/scheme.h"
+#include "render/shading.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static void scale_points(rend_look *look, float step)
+{
+    float now = look->size_mode == REND_SIZE_FIXED ? fmaxf(look->point_px, 1) : 1;
+    if (look->size_mode == REND_SIZE_FIXED || step > 0) now += step;
+    look->size_mode = REND_SIZE_FIXED;
+    look->point_px = fminf(fmaxf(now, 1), 32);
+}
+
+bool rend_look_press(rend_look *look, int key, bool shift)
+{
+    if (key == '+') scale_points(look, 1);
+    else if (key == '-') scale_points(look, -1);
+    else if (key == '0') look->size_mode = REND_SIZE_AUTO;
+    else return rend_shading_press(look, key, shift);
+    return true;
+}
+
+bool rend_look_press_colour(rend_look *look, int key, bool shift, const rend_choice *choices,
+                            uint32_t count)
+{
+    double brightness = look->brightness > 0 ? look->brightness : 1;
+    if (key == 'C') {
+        rend_choice_step(choices, count, shift ? -1 : 1, look);
+    } else if (key >= '1' && key <= '9') {
+        rend_choice_read(rend_choice_name((rend_colour)(key - '1')), look);
+        look->has_range = false, look->map = REND_MAP_USUAL;
+    } else if (key == 'M') {
+        look->map = (rend_map)(rend_choice_map(look) % (REND_MAP_COUNT - 1) + 1);
+    } else if (key == ',' || key == '.') {
+        look->brightness = brightness * (key == '.' ? 1.25 : 0.8);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+void rend_look_cut(rend_look *look, const rend_camera *camera, const double *place)
+{
+    double right[3], up[3], back[3];
+    if (!look->has_clip || place == NULL) look->clip = rend_clip_open();
+    look->has_clip = place != NULL;
+    rend_camera_axes(camera, right, up, back);
+    if (place != NULL) rend_clip_cut(back, place, &look->clip);
+}
+
+static const char *colour_name(const rend_look *look)
+{
+    return look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : rend_choice_name(look->colour);
+}
+
+void rend_look_keep(const rend_look *look, const rend_look *opening, rend_key *key)
+{
+    if (!rend_scheme_same(look, opening))
+        snprintf(key->colour, sizeof key->colour, "%s", colour_name(look));
+    key->clip = look->has_clip ? look->clip : rend_clip_open();
+    key->has_clip = look->has_clip != opening->has_clip ||
+                    (look->has_clip && memcmp(&look->clip, &opening->clip, sizeof look->clip) != 0);
+}
+
+void rend_look_recall(rend_look *look, const rend_look *opening, const char *colour,
+                      const rend_box *clip, const rend_choice *choices, uint32_t count)
+{
+    for (uint32_t i = 0; colour != NULL && i < count; i++) {
+        if (strcmp(rend_choice_text(&choices[i]), colour) != 0) continue;
+        look->colour = choices[i].colour;
+        look->attribute = choices[i].attribute;
+    }
+    look->has_clip = clip != NULL || opening->has_clip;
+    look->clip = clip != NULL ? *clip : opening->clip;
+}
+
+void rend_look_text(const rend_look *look, char *out, size_t size)
+{
+    char shading[96];
+    rend_shading_text(look, shading, sizeof shading);
+    if (look->size_mode == REND_SIZE_FIXED)
+        snprintf(out, size, "%s  %g px  %s", colour_name(look), (double)fmaxf(look->point_px, 1),
+                 shading);
+    else snprintf(out, size, "%s  %s", colour_name(look), shading);
+}
