@@ -189,11 +189,10 @@ bool cli_read_up(cli_options *o, const char *v)
 
 bool cli_read_size(cli_options *o, const char *v)
 {
-    int used = 0;
-    if (sscanf(v, "%u%*1[xX]%u%n", &o->width, &o->height, &used) != 2 || v[used] != '\0')
-        return false;
-    return o->width >= 1 && o->width <= REND_SIZE_MAX && o->height >= 1 &&
-           o->height <= REND_SIZE_MAX;
+    uint32_t size[2];
+    if (!cli_value_pair(v, "xX", size)) return false;
+    o->width = size[0], o->height = size[1];
+    return o->width <= REND_SIZE_MAX && o->height <= REND_SIZE_MAX;
 }
 
 /* Whether the scans have such an attribute is known when they have been read. */
@@ -364,10 +363,13 @@ bool cli_read_preset(cli_options *o, const char *v)
 bool cli_read_rate(cli_options *o, const char *v)
 {
     double rate;
-    int used = 0;
+    uint32_t fraction[2];
     cli_film_options *f = &o->film;
-    if (sscanf(v, "%u/%u%n", &f->rate_num, &f->rate_den, &used) == 2 && v[used] == '\0')
-        return f->rate_den > 0 && f->rate_num >= f->rate_den && f->rate_num / f->rate_den <= 1000;
+    if (cli_value_pair(v, "/", fraction)) {
+        f->rate_num = fraction[0], f->rate_den = fraction[1];
+        return f->rate_num <= INT32_MAX && f->rate_num >= f->rate_den &&
+               f->rate_num / f->rate_den <= 1000;
+    }
     if (!cli_value_real(v, 1, 1000, &rate)) return false;
     double whole = ceil(rate);
     bool television = rate < whole && fabs(rate - whole / 1.001) < 0.006;

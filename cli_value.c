@@ -24,6 +24,17 @@ bool cli_value_u32(const char *text, uint32_t low, uint32_t high, uint32_t *out)
     return true;
 }
 
+bool cli_value_pair(const char *text, const char *between, uint32_t out[2])
+{
+    char *end;
+    if (!isdigit((unsigned char)text[0])) return false;
+    unsigned long long first = strtoull(text, &end, 10);
+    if (first < 1 || first > UINT32_MAX || *end == '\0' || strchr(between, *end) == NULL)
+        return false;
+    out[0] = (uint32_t)first;
+    return cli_value_u32(end + 1, 1, UINT32_MAX, &out[1]);
+}
+
 bool cli_value_amount(const char *text, double base, uint64_t *out)
 {
     static const char units[] = "KMGT";

@@ -9,6 +9,9 @@
 bool cli_value_count(const char *text, uint64_t low, uint64_t high, uint64_t *out);
 bool cli_value_u32(const char *text, uint32_t low, uint32_t high, uint32_t *out);
 
+/* Two such, from 1 on, with one of the characters of `between` between them. */
+bool cli_value_pair(const char *text, const char *between, uint32_t out[2]);
+
 /* A positive number with a unit: K, M, G, T, of `base` (1000 for points, 1024 for bytes). */
 bool cli_value_amount(const char *text, double base, uint64_t *out);
 

@@ -1,5 +1,6 @@
 #include "render/choice.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const struct {
@@ -22,10 +23,16 @@ const char *rend_choice_name(rend_colour colour)
     return colours[colour].name;
 }
 
+static void name_attribute(const char *name, rend_look *look)
+{
+    memset(look->attribute, 0, sizeof look->attribute);
+    snprintf(look->attribute, sizeof look->attribute, "%s", name);
+}
+
 void rend_choice_read(const char *name, rend_look *look)
 {
     look->colour = REND_COLOUR_ATTRIBUTE;
-    look->attribute = name;
+    name_attribute(name, look);
     for (int c = 0; c < REND_COLOUR_ATTRIBUTE; c++)
         if (strcmp(name, colours[c].name) == 0) look->colour = (rend_colour)c;
 }
@@ -103,14 +110,19 @@ static bool is_chosen(const rend_choice *choice, const rend_look *look)
                                               strcmp(choice->attribute, look->attribute) == 0);
 }
 
+void rend_choice_use(const rend_choice *choice, rend_look *look)
+{
+    look->colour = choice->colour;
+    name_attribute(choice->attribute, look);
+}
+
 void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend_look *look)
 {
     uint32_t at = 0;
     while (at < count && !is_chosen(&choices[at], look))
         at++;
     at = at == count ? 0 : (uint32_t)((int)(at + count) + step) % count;
-    look->colour = choices[at].colour;
-    look->attribute = choices[at].attribute;
+    rend_choice_use(&choices[at], look);
     look->has_range = false;
     look->map = REND_MAP_USUAL;
 }

@@ -14,7 +14,7 @@ enum { REND_CHOICES_MAX = REND_COLOUR_COUNT + MOSPT_ATTRIBUTES_MAX };
 /* "rgb" ..., as on the command line; NULL for REND_COLOUR_ATTRIBUTE. */
 const char *rend_choice_name(rend_colour colour);
 
-/* Reads such a name, or takes it for that of an attribute, which stays borrowed. */
+/* Reads such a name, or takes it for that of an attribute. */
 void rend_choice_read(const char *name, rend_look *look);
 
 /* Index of the attribute that a colouring shows, -1 if it is not there or shows none. */
@@ -29,6 +29,9 @@ uint32_t rend_choice_list(const mospt_metadata *metadata, rend_choice *out);
 
 /* The name of one, whichever kind it is; borrowed from it. */
 const char *rend_choice_text(const rend_choice *choice);
+
+/* Has a look show it; range and map stay. */
+void rend_choice_use(const rend_choice *choice, rend_look *look);
 
 /* Changes a look to the next one of a list (step 1) or the one before (step -1), with its usual
  * range and map. */

@@ -12,7 +12,6 @@ bool rend_colours_init(rend_colours *colours, const mospt_dataset *dataset, mosp
 void rend_colours_fini(rend_colours *colours)
 {
     rend_scheme_destroy(colours->scheme);
-    free(colours->attribute);
     *colours = (rend_colours){0};
 }
 
@@ -45,13 +44,8 @@ bool rend_colours_use(rend_colours *colours, const rend_look *look, rend_paint_c
     bool same = c->begun && rend_scheme_same(look, &c->look);
     *change = REND_PAINT_KEPT;
     if (same && !c->again) return true;
-    char *attribute = look->attribute != NULL ? strdup(look->attribute) : NULL;
-    if (look->attribute != NULL && attribute == NULL)
-        return mospt_err_nomem(err, strlen(look->attribute));
-    if (!rend_scheme_make(c->scheme, look, &paint, &c->legend, err)) return free(attribute), false;
-    free(c->attribute);
+    if (!rend_scheme_make(c->scheme, look, &paint, &c->legend, err)) return false;
     c->look = *look;
-    c->look.attribute = c->attribute = attribute;
     *change = same && is_same_paint(&paint, &c->paint) ? REND_PAINT_EQUAL : REND_PAINT_OTHER;
     c->paint = paint;
     c->begun = true;

@@ -5,8 +5,7 @@
 
 typedef struct {
     rend_scheme *scheme; /* owned, of the dataset in hand */
-    rend_look look;      /* that the paint was made for, and its attribute's name: */
-    char *attribute;     /* owned: the one who named it may be gone */
+    rend_look look;      /* that the paint was made for */
     rend_paint paint;
     rend_legend legend;
     bool begun; /* there is a paint */

@@ -72,8 +72,7 @@ void rend_look_recall(rend_look *look, const rend_look *opening, const char *col
 {
     for (uint32_t i = 0; colour != NULL && i < count; i++) {
         if (strcmp(rend_choice_text(&choices[i]), colour) != 0) continue;
-        look->colour = choices[i].colour;
-        look->attribute = choices[i].attribute;
+        rend_choice_use(&choices[i], look);
     }
     look->has_clip = clip != NULL || opening->has_clip;
     look->clip = clip != NULL ? *clip : opening->clip;

@@ -11,7 +11,7 @@ bool rend_look_press(rend_look *look, int key, bool shift);
 
 /* Likewise what colours show: C the next of the choices, 1 to 9, M colour map, , and . brightness.
  * Whether the dataset has them, rend_scheme_fits() knows.
- * choices  [count]; the look borrows names of attributes from them */
+ * choices  [count] */
 bool rend_look_press_colour(rend_look *look, int key, bool shift, const rend_choice *choices,
                             uint32_t count);
 

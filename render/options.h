@@ -66,6 +66,8 @@ typedef enum {
     REND_SHAPE_COUNT
 } rend_shape;
 
+enum { REND_ATTRIBUTE_MAX = 64 }; /* of a name with the number of a component, bytes */
+
 typedef struct {
     rend_size_mode size_mode;
     float point_px;     /* REND_SIZE_FIXED; 0: 1 */
@@ -77,10 +79,10 @@ typedef struct {
                          averaged with it; 0: none are */
     uint32_t fill_px; /* holes up to about twice as wide are closed from their borders; 0: off */
     rend_colour colour;
-    const char *attribute; /* REND_COLOUR_ATTRIBUTE: its name, borrowed; "NAME:2" is the second of
-                              its components */
-    bool has_range;        /* without it all but the lowest and highest hundredth of the values */
-    double range[2];       /* values at both ends of the colour map, in the unit of the values */
+    char attribute[REND_ATTRIBUTE_MAX]; /* REND_COLOUR_ATTRIBUTE: its name, zeros behind it;
+                                           "NAME:2" is the second of its components */
+    bool has_range;  /* without it all but the lowest and highest hundredth of the values */
+    double range[2]; /* values at both ends of the colour map, in the unit of the values */
     rend_map map;
     double brightness;   /* factor on stored colours; 0: 1 */
     double gamma;        /* above 1 lifts the dark ones; 0: 1 */

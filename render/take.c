@@ -164,9 +164,8 @@ static void show_colours(const char *colour, rend_look *look)
 {
     rend_look other = *look;
     rend_choice_read(colour, &other);
-    bool same = other.colour == look->colour &&
-                (other.colour != REND_COLOUR_ATTRIBUTE ||
-                 (look->attribute != NULL && strcmp(other.attribute, look->attribute) == 0));
+    bool same = other.colour == look->colour && (other.colour != REND_COLOUR_ATTRIBUTE ||
+                                                 strcmp(other.attribute, look->attribute) == 0);
     if (same) return;
     other.has_range = false, other.map = REND_MAP_USUAL;
     *look = other;

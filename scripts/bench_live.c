@@ -118,7 +118,8 @@ static bool read_points(const bench *b, const mospt_dataset *dataset, mospt_vert
                         uint32_t *count, mospt_err *err)
 {
     const mospt_hierarchy *h = &dataset->hierarchy;
-    uint64_t most = b->o->common.view.budget_points;
+    uint64_t most = b->o->common.view.budget_points, all = dataset->metadata.point_count;
+    if (most > all) most = all;
     *out = malloc(most * sizeof **out);
     if (*out == NULL) return mospt_err_nomem(err, most * sizeof **out);
     *count = 0;

@@ -59,8 +59,7 @@ static void cache_sizes_do_not_show_in_any_colours(void **unused)
     assert_true(count > 4);
     for (uint32_t c = 0; c < count; c++) {
         rend_shot_options options = {.width = WIDTH, .height = HEIGHT, .legend = true};
-        options.look.colour = choices[c].colour;
-        options.look.attribute = choices[c].attribute;
+        rend_choice_use(&choices[c], &options.look);
         uint8_t *all = take(options);
         options.limits = (rend_limits){.ram_cache_bytes = 1, .gpu_cache_bytes = 1};
         uint8_t *paged = take(options);

@@ -275,10 +275,8 @@ static void every_look_can_be_drawn(void **unused)
     uint32_t count = rend_choice_list(&site.dataset->metadata, choices);
     for (uint32_t c = 0; c < count; c++)
         for (int mode = REND_SIZE_AUTO; mode <= REND_SIZE_WORLD; mode++) {
-            rend_look look = {.colour = choices[c].colour,
-                              .attribute = choices[c].attribute,
-                              .size_mode = (rend_size_mode)mode,
-                              .point_px = 5};
+            rend_look look = {.size_mode = (rend_size_mode)mode, .point_px = 5};
+            rend_choice_use(&choices[c], &look);
             look.point_m = 3 * (float)site.dataset->metadata.grid.step,
             look.no_edl = mode == REND_SIZE_FIXED;
             for (int s = 0; s < 4 * REND_SHAPE_COUNT; s++) {

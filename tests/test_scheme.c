@@ -252,6 +252,12 @@ static void stepping_goes_through_all_that_is_offered_and_back(void **unused)
         assert_false(look.has_range);
         CORE_NEED(rend_scheme_fits(site.dataset, &look, &err));
     }
+    /* The look keeps its attribute, whatever becomes of the list. */
+    rend_choice_use(&choices[4], &look);
+    memcpy(choices[4].attribute, "other", 6);
+    assert_string_equal(look.attribute, "tag");
+    memcpy(choices[4].attribute, "tag", 4);
+    look.colour = REND_COLOUR_RGB;
     for (uint32_t i = 1; i <= count; i++) {
         rend_choice_step(choices, count, -1, &look);
         assert_int_equal(look.colour, choices[(count - i) % count].colour);
@@ -266,13 +272,12 @@ static void stepping_goes_through_all_that_is_offered_and_back(void **unused)
 static void looks_that_paint_alike_are_the_same(void **unused)
 {
     (void)unused;
-    char name[] = "tag"; /* equal text elsewhere */
     const rend_look a = {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag"};
-    rend_look b = {.colour = REND_COLOUR_ATTRIBUTE, .attribute = name, .point_px = 9};
+    rend_look b = {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag", .point_px = 9};
     assert_true(rend_scheme_same(&a, &b));
     b.map = REND_MAP_GREY;
     assert_false(rend_scheme_same(&a, &b));
-    b = a, b.attribute = "scan";
+    b = a, memcpy(b.attribute, "scan", 5);
     assert_false(rend_scheme_same(&a, &b));
     b = a, b.has_range = true, b.range[1] = 1;
     assert_false(rend_scheme_same(&a, &b));
