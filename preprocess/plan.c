@@ -10,7 +10,7 @@
 static const uint64_t FIXED_SIZE = UINT64_C(24) << 20;
 /* Blocks are large enough for a disk, and small enough that thousands of spools with a few points
  * each waste little. */
-enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 64 << 10, SLICES_MAX = 20 };
+enum { BLOCK_MIN = 4 << 10, BLOCK_MAX = 64 << 10, SLICES_MAX = 16 };
 /* Rejection files of more points are cut by another pass, which all threads share. */
 enum { SOLVE_POINTS_MAX = 1 << 24 };
 
