@@ -221,6 +221,11 @@ void rcpu_frames_clear(rcpu_frames *frames, rcpu_threads *threads)
     frames->merged = frames->blending = false;
 }
 
+static uint32_t *picture_row(const rcpu_frames *f, uint32_t y)
+{
+    return f->picture + (size_t)y * f->size.stride;
+}
+
 static void merge_rows(void *user, uint32_t worker, uint32_t job)
 {
     (void)worker;
@@ -232,18 +237,25 @@ static void merge_rows(void *user, uint32_t worker, uint32_t job)
         p->kernel->look(f->frames[0] + first, f->size.width, f->points.logs + at,
                         f->points.colours + at);
         extend(f, &f->points, y);
+        if (p->light != NULL) p->kernel->shade(p->light, y, &f->points, picture_row(f, y));
     }
 }
 
-void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads)
+/* light    of a picture whose rows are shaded while they are at hand; NULL: none are */
+static void merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,
+                  const rcpu_light *light)
 {
-    if (frames->merged) return;
-    pass p = {.frames = frames, .kernel = kernel};
+    pass p = {.frames = frames, .kernel = kernel, .light = light};
     find_drawn(&p);
     run(&p, threads, merge_rows);
     memset(frames->drawn, 0, sizeof frames->drawn);
     frames->drawn[0] = true;
     frames->merged = true;
+}
+
+void rcpu_frames_merge(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads)
+{
+    if (!frames->merged) merge(frames, kernel, threads, NULL);
 }
 
 static void depth_rows(void *user, uint32_t worker, uint32_t job)
@@ -336,7 +348,13 @@ static void shade_rows(void *user, uint32_t worker, uint32_t job)
     pass *p = user;
     rcpu_frames *f = p->frames;
     for (uint32_t y = job * ROWS_PER_JOB; y < end_of(f, job); y++)
-        p->kernel->shade(p->light, y, p->from, f->picture + (size_t)y * f->size.stride);
+        p->kernel->shade(p->light, y, p->from, picture_row(f, y));
+}
+
+/* True if no pixel of the picture depends on those around it. */
+static bool is_flat(const rcpu_frames *frames, const rcpu_light *light, const rcpu_hole *hole)
+{
+    return !frames->blending && hole->radius == 0 && !(light->edl_strength > 0);
 }
 
 bool rcpu_frames_finish(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_threads *threads,
@@ -344,6 +362,10 @@ bool rcpu_frames_finish(rcpu_frames *frames, const rcpu_kernel *kernel, rcpu_thr
                         mospt_err *err)
 {
     pass p = {.frames = frames, .kernel = kernel, .light = light, .hole = hole};
+    if (!frames->merged && is_flat(frames, light, hole)) {
+        merge(frames, kernel, threads, light);
+        return true;
+    }
     rcpu_frames_merge(frames, kernel, threads);
     p.from = &frames->points, p.slab_log = slab_log;
     if (frames->blending) {
