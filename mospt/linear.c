@@ -64,7 +64,7 @@ static uint64_t word_at(const mospt_linear_input *in, uint64_t key, size_t at)
     return __builtin_bswap64(word);
 }
 
-/* Two, as most cells have that have several: which of them comes first no processor can foretell. */
+/* Two, as most cells have that have several: which comes first no processor can foretell. */
 static void sort_two(const mospt_linear_input *in, uint64_t *keys, size_t at)
 {
     uint64_t a = keys[0], b = keys[1], first = word_at(in, a, at), second = word_at(in, b, at);
@@ -263,8 +263,8 @@ static void end_depth(linear *l, uint32_t level)
     l->standing = to;
 }
 
-/* Gives every point its level: that of the last depth at which it stood for a cell, or one more than
- * there are. */
+/* Gives every point its level: that of the last depth at which it stood for a cell, or one more
+ * than there are. */
 static void assign_levels(linear *l, uint64_t *keys, uint32_t count)
 {
     memset(l->level, (int)l->in->depth + 1, count);
