@@ -74,9 +74,7 @@ bool cli_read_no_occlusion(cli_options *o, const char *v)
 
 bool cli_read_fps(cli_options *o, const char *v)
 {
-    char *end;
-    o->fps = strtod(v, &end);
-    return end != v && *end == '\0' && o->fps >= 1 && o->fps <= 240;
+    return cli_value_real(v, 1, 240, &o->fps);
 }
 
 bool cli_read_no_edl(cli_options *o, const char *v)

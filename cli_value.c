@@ -6,14 +6,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A number from low to high with whatever behind it. */
+static bool read_count(const char *text, uint64_t low, uint64_t high, uint64_t *out, char **end)
+{
+    if (!isdigit((unsigned char)text[0])) return false;
+    *out = strtoull(text, end, 10);
+    return *out >= low && *out <= high;
+}
+
 bool cli_value_count(const char *text, uint64_t low, uint64_t high, uint64_t *out)
 {
     char *end;
-    if (!isdigit((unsigned char)text[0])) return false;
-    unsigned long long value = strtoull(text, &end, 10);
-    if (*end != '\0' || value < low || value > high) return false;
-    *out = value;
-    return true;
+    return read_count(text, low, high, out, &end) && *end == '\0';
 }
 
 bool cli_value_u32(const char *text, uint32_t low, uint32_t high, uint32_t *out)
@@ -27,10 +31,9 @@ bool cli_value_u32(const char *text, uint32_t low, uint32_t high, uint32_t *out)
 bool cli_value_pair(const char *text, const char *between, uint32_t out[2])
 {
     char *end;
-    if (!isdigit((unsigned char)text[0])) return false;
-    unsigned long long first = strtoull(text, &end, 10);
-    if (first < 1 || first > UINT32_MAX || *end == '\0' || strchr(between, *end) == NULL)
-        return false;
+    uint64_t first;
+    if (!read_count(text, 1, UINT32_MAX, &first, &end)) return false;
+    if (*end == '\0' || strchr(between, *end) == NULL) return false;
     out[0] = (uint32_t)first;
     return cli_value_u32(end + 1, 1, UINT32_MAX, &out[1]);
 }

@@ -104,6 +104,17 @@ const char *rend_choice_text(const rend_choice *choice)
                                                    : colours[choice->colour].name;
 }
 
+const char *rend_choice_shown(const rend_look *look)
+{
+    return look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : rend_choice_name(look->colour);
+}
+
+bool rend_choice_same(const rend_look *a, const rend_look *b)
+{
+    return a->colour == b->colour &&
+           (a->colour != REND_COLOUR_ATTRIBUTE || strcmp(a->attribute, b->attribute) == 0);
+}
+
 static bool is_chosen(const rend_choice *choice, const rend_look *look)
 {
     return choice->colour == look->colour && (choice->colour != REND_COLOUR_ATTRIBUTE ||

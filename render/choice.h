@@ -33,6 +33,12 @@ const char *rend_choice_text(const rend_choice *choice);
 /* Has a look show it; range and map stay. */
 void rend_choice_use(const rend_choice *choice, rend_look *look);
 
+/* What a look's colours show, by its name; borrowed from the look, or there for good. */
+const char *rend_choice_shown(const rend_look *look);
+
+/* True if the colours of two looks show the same, whatever their ranges and maps. */
+bool rend_choice_same(const rend_look *a, const rend_look *b);
+
 /* Changes a look to the next one of a list (step 1) or the one before (step -1), with its usual
  * range and map. */
 void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend_look *look);

@@ -1,6 +1,5 @@
 #include "render/colours.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 bool rend_colours_init(rend_colours *colours, const mospt_dataset *dataset, mospt_err *err)

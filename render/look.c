@@ -53,15 +53,10 @@ void rend_look_cut(rend_look *look, const rend_camera *camera, const double *pla
     if (place != NULL) rend_clip_cut(back, place, &look->clip);
 }
 
-static const char *colour_name(const rend_look *look)
-{
-    return look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : rend_choice_name(look->colour);
-}
-
 void rend_look_keep(const rend_look *look, const rend_look *opening, rend_key *key)
 {
     if (!rend_scheme_same(look, opening))
-        snprintf(key->colour, sizeof key->colour, "%s", colour_name(look));
+        snprintf(key->colour, sizeof key->colour, "%s", rend_choice_shown(look));
     key->clip = look->has_clip ? look->clip : rend_clip_open();
     key->has_clip = look->has_clip != opening->has_clip ||
                     (look->has_clip && memcmp(&look->clip, &opening->clip, sizeof look->clip) != 0);
@@ -70,10 +65,8 @@ void rend_look_keep(const rend_look *look, const rend_look *opening, rend_key *k
 void rend_look_recall(rend_look *look, const rend_look *opening, const char *colour,
                       const rend_box *clip, const rend_choice *choices, uint32_t count)
 {
-    for (uint32_t i = 0; colour != NULL && i < count; i++) {
-        if (strcmp(rend_choice_text(&choices[i]), colour) != 0) continue;
-        rend_choice_use(&choices[i], look);
-    }
+    for (uint32_t i = 0; colour != NULL && i < count; i++)
+        if (strcmp(rend_choice_text(&choices[i]), colour) == 0) rend_choice_use(&choices[i], look);
     look->has_clip = clip != NULL || opening->has_clip;
     look->clip = clip != NULL ? *clip : opening->clip;
 }
@@ -83,7 +76,7 @@ void rend_look_text(const rend_look *look, char *out, size_t size)
     char shading[96];
     rend_shading_text(look, shading, sizeof shading);
     if (look->size_mode == REND_SIZE_FIXED)
-        snprintf(out, size, "%s  %g px  %s", colour_name(look), (double)fmaxf(look->point_px, 1),
-                 shading);
-    else snprintf(out, size, "%s  %s", colour_name(look), shading);
+        snprintf(out, size, "%s  %g px  %s", rend_choice_shown(look),
+                 (double)fmaxf(look->point_px, 1), shading);
+    else snprintf(out, size, "%s  %s", rend_choice_shown(look), shading);
 }

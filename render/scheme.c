@@ -52,9 +52,7 @@ bool rend_scheme_same(const rend_look *a, const rend_look *b)
 {
     bool same_range = a->has_range == b->has_range &&
                       (!a->has_range || memcmp(a->range, b->range, sizeof a->range) == 0);
-    bool same_attribute = a->colour != REND_COLOUR_ATTRIBUTE || b->colour != a->colour ||
-                          strcmp(a->attribute, b->attribute) == 0;
-    return a->colour == b->colour && same_attribute && same_range && a->map == b->map &&
+    return rend_choice_same(a, b) && same_range && a->map == b->map &&
            a->brightness == b->brightness && a->gamma == b->gamma;
 }
 
@@ -115,8 +113,7 @@ static bool fits_colours(const rend_look *look, const rend_paint *p, mospt_err *
 {
     bool own = look->colour == REND_COLOUR_ATTRIBUTE ? p->source == REND_PAINT_DIRECTION
                                                      : modes[look->colour].classes;
-    const char *name =
-        look->colour == REND_COLOUR_ATTRIBUTE ? look->attribute : rend_choice_name(look->colour);
+    const char *name = rend_choice_shown(look);
     if (own && look->map != REND_MAP_USUAL)
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "%s has colours of its own, a colour map is for values", name);

@@ -164,9 +164,7 @@ static void show_colours(const char *colour, rend_look *look)
 {
     rend_look other = *look;
     rend_choice_read(colour, &other);
-    bool same = other.colour == look->colour && (other.colour != REND_COLOUR_ATTRIBUTE ||
-                                                 strcmp(other.attribute, look->attribute) == 0);
-    if (same) return;
+    if (rend_choice_same(&other, look)) return;
     other.has_range = false, other.map = REND_MAP_USUAL;
     *look = other;
 }
