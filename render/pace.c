@@ -5,7 +5,7 @@
 
 /* Frames vary; this share of the target is planned with, so that few are late. */
 #define PLANNED 0.85
-#define UPLOAD_SHARE 0.2
+#define UPLOAD_SHARE 0.1
 /* Points get this share at least: where shading alone takes longer than a frame should, showing
  * nothing would not help. And so points are always tried, and their cost known. */
 #define POINT_SHARE 0.25

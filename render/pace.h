@@ -44,5 +44,5 @@ void rend_pace_note(rend_pace *pace, uint64_t points, uint64_t bytes, bool shown
  * rend_pace_bytes() allows. Grows by no more than a half beyond what was drawn lately. */
 uint64_t rend_pace_points(const rend_pace *pace);
 
-/* Bytes that may be uploaded in one frame: what takes a fifth of its time. */
+/* Bytes that may be uploaded in one frame: what takes a tenth of its time. */
 uint64_t rend_pace_bytes(const rend_pace *pace);

@@ -3,6 +3,7 @@
 #include "render/cpu/frames.h"
 #include "render/cpu/log.h"
 #include "render/cpu/memory.h"
+#include "render/cpu/touch.h"
 #include "render/gl/driver.h"
 
 #include <assert.h>
@@ -27,6 +28,7 @@ typedef struct {
     rcpu_threads *threads;
     mospt_vertex *arena; /* [arena_size], owned */
     uint64_t arena_size;
+    rcpu_touch *arena_touch;
     rcpu_frames frames;
     uint32_t *octants; /* [8 * octant_capacity], owned: those of the scene */
     uint32_t octant_capacity;
@@ -41,12 +43,19 @@ static size_t arena_bytes(const cpu_rgl *c)
     return (c->arena_size + 1) * sizeof *c->arena;
 }
 
+static void drop_arena(cpu_rgl *c)
+{
+    rcpu_touch_destroy(c->arena_touch);
+    rcpu_memory_release(c->arena, arena_bytes(c));
+    c->arena = NULL, c->arena_touch = NULL, c->arena_size = 0;
+}
+
 static void cpu_destroy(rgl *gl)
 {
     cpu_rgl *c = (cpu_rgl *)gl;
     rcpu_threads_destroy(c->threads);
     rcpu_frames_fini(&c->frames);
-    rcpu_memory_release(c->arena, arena_bytes(c));
+    drop_arena(c);
     free(c->octants);
     free(c->chunks);
     free(c);
@@ -60,12 +69,15 @@ static const char *cpu_renderer(const rgl *gl)
 static bool cpu_arena_create(rgl *gl, uint64_t vertex_count, mospt_err *err)
 {
     cpu_rgl *c = (cpu_rgl *)gl;
-    rcpu_memory_release(c->arena, arena_bytes(c));
+    drop_arena(c);
     c->arena_size = vertex_count;
     c->arena = rcpu_memory_take(arena_bytes(c));
-    if (c->arena != NULL) return true;
-    c->arena_size = 0;
-    return mospt_err_nomem(err, vertex_count * sizeof *c->arena);
+    if (c->arena == NULL) {
+        c->arena_size = 0;
+        return mospt_err_nomem(err, vertex_count * sizeof *c->arena);
+    }
+    c->arena_touch = rcpu_touch_create(c->arena, arena_bytes(c));
+    return true;
 }
 
 static bool cpu_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertices, uint32_t count,
@@ -75,6 +87,7 @@ static bool cpu_arena_upload(rgl *gl, uint64_t first, const mospt_vertex *vertic
     cpu_rgl *c = (cpu_rgl *)gl;
     assert(first <= c->arena_size && count <= c->arena_size - first);
     memcpy(c->arena + first, vertices, count * sizeof *vertices);
+    rcpu_touch_filled(c->arena_touch, (first + count) * sizeof *vertices);
     return true;
 }
 

@@ -5,8 +5,11 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
-enum { THREADS_MAX = 256 };
+/* Rounds of a frame follow each other at once: to sleep in between and be woken takes longer than
+ * that, and who is woken may be put on the processor of who wakes, instead of one that is idle. */
+enum { THREADS_MAX = 256, SPIN_NS = 200000, SPINS_PER_LOOK = 32 };
 
 typedef struct {
     rcpu_threads *threads;
@@ -19,16 +22,44 @@ struct rcpu_threads {
     worker *workers;  /* [count], owned; the caller is number 0 */
     uint32_t made;    /* threads to join */
     atomic_uint next; /* the next job of the round */
+    /* The last round that was begun, and that all invited workers have ended: they follow what is
+     * under the lock, for those who wait without it. */
+    atomic_uint begun_round, ended_round;
     pthread_mutex_t lock;
     pthread_cond_t begun, ended;
     /* Under the lock; what describes a round does not change while `busy` is above 0. */
-    uint64_t round;
+    uint32_t round;
     uint32_t invited, busy; /* workers that shall take part in the round, and are not done */
     bool stop;
     uint32_t job_count;
     rcpu_job *job;
     void *user;
 };
+
+static void relax(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#elif defined(__aarch64__)
+    __asm__ volatile("yield");
+#endif
+}
+
+static int64_t now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
+}
+
+/* Waits for a little while until the round is this one, or is not. */
+static bool spin(const atomic_uint *round, uint32_t value, bool is)
+{
+    for (int64_t end = now_ns() + SPIN_NS; now_ns() < end;)
+        for (int i = 0; i < SPINS_PER_LOOK; i++, relax())
+            if ((atomic_load_explicit(round, memory_order_acquire) == value) == is) return true;
+    return false;
+}
 
 static void take_jobs(rcpu_threads *t, uint32_t number)
 {
@@ -41,20 +72,23 @@ static void *work(void *argument)
 {
     worker *w = argument;
     rcpu_threads *t = w->threads;
-    pthread_mutex_lock(&t->lock);
-    for (uint64_t seen = 0;;) {
+    for (uint32_t seen = 0;;) {
+        spin(&t->begun_round, seen, false);
+        pthread_mutex_lock(&t->lock);
         while (!t->stop && t->round == seen)
             pthread_cond_wait(&t->begun, &t->lock);
-        if (t->stop) break;
         seen = t->round;
-        if (w->number >= t->invited) continue;
+        bool stop = t->stop, is_invited = w->number < t->invited;
         pthread_mutex_unlock(&t->lock);
+        if (stop) return NULL;
+        if (!is_invited) continue;
         take_jobs(t, w->number);
         pthread_mutex_lock(&t->lock);
-        if (--t->busy == 0) pthread_cond_signal(&t->ended);
+        bool is_last = --t->busy == 0;
+        if (is_last) pthread_cond_signal(&t->ended);
+        pthread_mutex_unlock(&t->lock);
+        if (is_last) atomic_store_explicit(&t->ended_round, seen, memory_order_release);
     }
-    pthread_mutex_unlock(&t->lock);
-    return NULL;
 }
 
 static uint32_t count_processors(void)
@@ -129,7 +163,9 @@ void rcpu_threads_run(rcpu_threads *threads, uint32_t workers, uint32_t job_coun
         pthread_cond_broadcast(&t->begun);
     }
     pthread_mutex_unlock(&t->lock);
+    if (workers > 1) atomic_store_explicit(&t->begun_round, t->round, memory_order_release);
     take_jobs(t, 0);
+    if (workers <= 1 || spin(&t->ended_round, t->round, true)) return;
     pthread_mutex_lock(&t->lock);
     while (t->busy > 0)
         pthread_cond_wait(&t->ended, &t->lock);
