@@ -179,25 +179,33 @@ static void scale_budget(viewer *v, double factor)
     rend_motion_restart(&v->motion);
 }
 
+/* What was drawn last.
+ * shown    with the words, as the window has it */
+static bool write_picture(viewer *v, bool shown, const char *path, mospt_err *err)
+{
+    size_t size = (size_t)v->view.width * v->view.height * 3;
+    uint8_t *rgb = malloc(size);
+    bool ok = rgb != NULL || mospt_err_nomem(err, size);
+    ok = ok && rgl_read_pixels(v->engine.gl, shown, v->view.width, v->view.height, rgb, err) &&
+         rend_image_write(path, rgb, v->view.width, v->view.height, err);
+    free(rgb);
+    return ok;
+}
+
 static void save_picture(viewer *v)
 {
     char name[64], text[1100];
     time_t now = time(NULL);
     struct tm local;
     mospt_err err = {0};
-    size_t size = (size_t)v->view.width * v->view.height * 3;
-    uint8_t *rgb = malloc(size);
     rend_view_of still = v->view;
     rend_progress ignored;
     still.parts = 0;
     localtime_r(&now, &local);
     strftime(name, sizeof name, "instantpoints-%Y%m%d-%H%M%S.png", &local);
-    bool ok = rgb != NULL || mospt_err_nomem(&err, size);
-    ok = ok && rend_stage_frame(v->stage, &still, NULL, &ignored, &err) &&
-         rgl_read_pixels(v->engine.gl, false, still.width, still.height, rgb, &err) &&
-         rend_image_write(name, rgb, still.width, still.height, &err);
-    free(rgb);
-    if (ok) snprintf(text, sizeof text, "saved %s", name);
+    if (rend_stage_frame(v->stage, &still, NULL, &ignored, &err) &&
+        write_picture(v, false, name, &err))
+        snprintf(text, sizeof text, "saved %s", name);
     else mospt_err_text(&err, text, sizeof text);
     tell(v, text);
 }
@@ -348,17 +356,6 @@ static bool draw_points(viewer *v, bool last, mospt_err *err)
     return true;
 }
 
-static bool write_screenshot(viewer *v, mospt_err *err)
-{
-    size_t size = (size_t)v->view.width * v->view.height * 3;
-    uint8_t *rgb = malloc(size);
-    bool ok = rgb != NULL || mospt_err_nomem(err, size);
-    ok = ok && rgl_read_pixels(v->engine.gl, true, v->view.width, v->view.height, rgb, err) &&
-         rend_image_write(v->options->screenshot, rgb, v->view.width, v->view.height, err);
-    free(rgb);
-    return ok;
-}
-
 static bool is_last(const viewer *v)
 {
     return v->quit || (v->options->frames > 0 && v->result.frames + 1 >= v->options->frames);
@@ -397,7 +394,7 @@ static bool frame(viewer *v, mospt_err *err)
     fit_text(v);                    /* now: with another context, it is gone */
     if (v->progress != REND_PART) { /* else the picture before stays on the screen */
         if (!draw_words(v, err)) return false;
-        if (last && !write_screenshot(v, err)) return false;
+        if (last && !write_picture(v, true, v->options->screenshot, err)) return false;
         rgl_window_show(v->window);
     }
     count_frame(v, &before, (rgl_window_seconds() - start) * 1e3);
