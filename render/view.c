@@ -126,7 +126,7 @@ static void look_through(viewer *v, const rend_camera *camera, const char *colou
 {
     if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
     v->view.camera = *camera;
-    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->choices, v->choice_count);
+    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->dataset);
     tell_of_strip(v);
 }
 

@@ -1,23 +1,25 @@
 #include "render/look.h"
 #include "render/clip.h"
+#include "render/scheme.h"
 #include "tests/core_tools.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Of a dataset with a scan and a tag for each point, and a normal. */
+/* It has a scan and a tag for each point, and a normal; of this, no more is looked at. */
+static mospt_dataset dataset;
 static rend_choice choices[REND_CHOICES_MAX];
 static uint32_t choice_count;
 
 static int list_choices(void **unused)
 {
     (void)unused;
-    mospt_metadata metadata = {0};
+    mospt_schema *schema = &dataset.metadata.schema;
     mospt_err err = {0};
-    CORE_NEED(mospt_schema_add(&metadata.schema, "scan", MOSPT_U16, 1, &err));
-    CORE_NEED(mospt_schema_add(&metadata.schema, "tag", MOSPT_U32, 1, &err));
-    CORE_NEED(mospt_schema_add(&metadata.schema, "normal", MOSPT_F32, 3, &err));
-    choice_count = rend_choice_list(&metadata, choices);
+    CORE_NEED(mospt_schema_add(schema, "scan", MOSPT_U16, 1, &err));
+    CORE_NEED(mospt_schema_add(schema, "tag", MOSPT_U32, 1, &err));
+    CORE_NEED(mospt_schema_add(schema, "normal", MOSPT_F32, 3, &err));
+    choice_count = rend_choice_list(&dataset.metadata, choices);
     assert_int_equal(choice_count, 6); /* rgb, elevation, scan, density, tag, normal */
     return 0;
 }
@@ -147,15 +149,16 @@ static void a_keyframe_keeps_what_has_changed(void **unused)
 static void recall(rend_look *look, const rend_look *opening, const char *colour,
                    const rend_box *clip)
 {
-    rend_look_recall(look, opening, colour, clip, choices, choice_count);
+    rend_look_recall(look, opening, colour, clip, &dataset);
 }
 
 static void a_moment_is_seen_as_it_was_kept(void **unused)
 {
     (void)unused;
-    static const char *const names[] = {"rgb", "elevation", "scan", "density", "tag", "normal"};
+    static const char *const names[] = {"rgb", "elevation", "scan",     "density",
+                                        "tag", "normal",    "normal:1", "normal:3"};
     const rend_look opening = {.colour = REND_COLOUR_ELEVATION};
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 8; i++) {
         rend_look kept = opening, look = {.colour = REND_COLOUR_RGB};
         rend_key key = {0};
         rend_choice_read(names[i], &kept);
@@ -188,11 +191,37 @@ a_moment_that_says_nothing_has_the_colours_of_before_and_the_clip_of_the_opening
 static void colours_that_are_not_there_are_not_recalled(void **unused)
 {
     (void)unused;
-    static const char *const names[] = {"time", "distance", "nonsense", "TAG"};
-    for (int i = 0; i < 4; i++) {
+    static const char *const names[] = {"time",     "distance", "nonsense", "TAG",
+                                        "normal:0", "normal:4", "normal:",  "normal:1x"};
+    for (int i = 0; i < 8; i++) {
         rend_look look = {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag"}, before = look;
         recall(&look, &before, names[i], NULL);
         assert_true(rend_choice_same(&look, &before));
+    }
+}
+
+/* One that stayed would keep the colours from being shown. */
+static void ranges_and_maps_come_and_go_with_the_colours_that_they_were_given_with(void **unused)
+{
+    (void)unused;
+    static const char *const others[] = {"rgb", "density", "normal", "normal:2"};
+    const rend_look opening = {.colour = REND_COLOUR_ELEVATION,
+                               .has_range = true,
+                               .range = {1, 5},
+                               .map = REND_MAP_INFERNO};
+    for (int i = 0; i < 4; i++) {
+        rend_look look = opening;
+        mospt_err err = {0};
+        look.map = REND_MAP_TURBO;
+        recall(&look, &opening, "elevation", NULL); /* as it is */
+        assert_true(look.has_range && look.map == REND_MAP_TURBO);
+        recall(&look, &opening, others[i], NULL);
+        assert_string_equal(rend_choice_shown(&look), others[i]);
+        assert_true(!look.has_range && look.map == REND_MAP_USUAL);
+        CORE_NEED(rend_scheme_fits(&dataset, &look, &err));
+        look.has_range = true, look.range[1] = 7;
+        recall(&look, &opening, "elevation", NULL);
+        assert_true(rend_scheme_same(&look, &opening));
     }
 }
 
@@ -227,6 +256,7 @@ int main(void)
         cmocka_unit_test(
             a_moment_that_says_nothing_has_the_colours_of_before_and_the_clip_of_the_opening),
         cmocka_unit_test(colours_that_are_not_there_are_not_recalled),
+        cmocka_unit_test(ranges_and_maps_come_and_go_with_the_colours_that_they_were_given_with),
         cmocka_unit_test(a_look_is_told_in_words),
     };
     return cmocka_run_group_tests(tests, list_choices, NULL);
