@@ -72,6 +72,13 @@ void rend_look_recall(rend_look *look, const rend_look *opening, const char *col
     look->clip = clip != NULL ? *clip : opening->clip;
 }
 
+void rend_look_fit(rend_look *look, const mospt_dataset *dataset)
+{
+    if (rend_scheme_fits(dataset, look, NULL)) return;
+    look->colour = REND_COLOUR_RGB;
+    look->has_range = false, look->map = REND_MAP_USUAL; /* neither is for stored colours */
+}
+
 void rend_look_text(const rend_look *look, char *out, size_t size)
 {
     char shading[96];

@@ -447,7 +447,7 @@ static bool take_newer(viewer *v, mospt_err *err)
     mospt_dataset_close(v->newer);
     v->dataset = v->newer = newer;
     v->choice_count = rend_choice_list(&newer->metadata, v->choices);
-    if (!rend_scheme_fits(newer, &v->view.look, NULL)) v->view.look.colour = REND_COLOUR_RGB;
+    rend_look_fit(&v->view.look, newer);
     v->result.swaps++;
     ok = ok &&
          rend_camera_make(&v->options->camera, newer, v->view.width, v->view.height, &v->home, err);

@@ -225,6 +225,31 @@ static void ranges_and_maps_come_and_go_with_the_colours_that_they_were_given_wi
     }
 }
 
+static void another_dataset_gets_a_look_that_it_can_show(void **unused)
+{
+    (void)unused;
+    static mospt_dataset moved, bare; /* the same attributes elsewhere; none */
+    const rend_look looks[] = {
+        {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag", .has_range = true, .range = {1, 2}},
+        {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "normal:3", .map = REND_MAP_TURBO},
+        {.colour = REND_COLOUR_SCAN},
+    };
+    mospt_schema *schema = &moved.metadata.schema;
+    mospt_err err = {0};
+    CORE_NEED(mospt_schema_add(schema, "normal", MOSPT_F32, 3, &err));
+    CORE_NEED(mospt_schema_add(schema, "mark", MOSPT_U8, 1, &err));
+    CORE_NEED(mospt_schema_add(schema, "tag", MOSPT_U64, 1, &err));
+    CORE_NEED(mospt_schema_add(schema, "scan", MOSPT_U16, 1, &err));
+    for (int i = 0; i < 3; i++) {
+        rend_look look = looks[i];
+        rend_look_fit(&look, &moved);
+        assert_true(rend_scheme_same(&look, &looks[i]));
+        rend_look_fit(&look, &bare);
+        assert_int_equal(look.colour, REND_COLOUR_RGB);
+        CORE_NEED(rend_scheme_fits(&bare, &look, &err));
+    }
+}
+
 static void a_look_is_told_in_words(void **unused)
 {
     (void)unused;
@@ -257,6 +282,7 @@ int main(void)
             a_moment_that_says_nothing_has_the_colours_of_before_and_the_clip_of_the_opening),
         cmocka_unit_test(colours_that_are_not_there_are_not_recalled),
         cmocka_unit_test(ranges_and_maps_come_and_go_with_the_colours_that_they_were_given_with),
+        cmocka_unit_test(another_dataset_gets_a_look_that_it_can_show),
         cmocka_unit_test(a_look_is_told_in_words),
     };
     return cmocka_run_group_tests(tests, list_choices, NULL);
