@@ -115,6 +115,18 @@ bool rend_choice_same(const rend_look *a, const rend_look *b)
            (a->colour != REND_COLOUR_ATTRIBUTE || strcmp(a->attribute, b->attribute) == 0);
 }
 
+void rend_choice_recall(const char *name, const rend_look *given, rend_look *look)
+{
+    rend_look other = *look;
+    rend_choice_read(name, &other);
+    if (rend_choice_same(&other, look)) return;
+    bool is_given = rend_choice_same(&other, given);
+    other.has_range = is_given && given->has_range;
+    memcpy(other.range, given->range, sizeof other.range);
+    other.map = is_given ? given->map : REND_MAP_USUAL;
+    *look = other;
+}
+
 static bool is_chosen(const rend_choice *choice, const rend_look *look)
 {
     return choice->colour == look->colour && (choice->colour != REND_COLOUR_ATTRIBUTE ||

@@ -33,6 +33,11 @@ const char *rend_choice_text(const rend_choice *choice);
 /* Has a look show it; range and map stay. */
 void rend_choice_use(const rend_choice *choice, rend_look *look);
 
+/* Has a look show what a keyframe names, as rend_choice_read(). A range and a map are for the
+ * colours that they were given with: others have their usual ones.
+ * given    the look that the window or the recording started with */
+void rend_choice_recall(const char *name, const rend_look *given, rend_look *look);
+
 /* What a look's colours show, by its name; borrowed from the look, or there for good. */
 const char *rend_choice_shown(const rend_look *look);
 

@@ -63,12 +63,20 @@ void rend_look_keep(const rend_look *look, const rend_look *opening, rend_key *k
 }
 
 void rend_look_recall(rend_look *look, const rend_look *opening, const char *colour,
-                      const rend_box *clip, const rend_choice *choices, uint32_t count)
+                      const rend_box *clip, const mospt_dataset *dataset)
 {
-    for (uint32_t i = 0; colour != NULL && i < count; i++)
-        if (strcmp(rend_choice_text(&choices[i]), colour) == 0) rend_choice_use(&choices[i], look);
+    rend_look other = *look;
+    if (colour != NULL && colour[0] != '\0') rend_choice_recall(colour, opening, &other);
+    if (rend_scheme_fits(dataset, &other, NULL)) *look = other;
     look->has_clip = clip != NULL || opening->has_clip;
     look->clip = clip != NULL ? *clip : opening->clip;
+}
+
+void rend_look_fit(rend_look *look, const mospt_dataset *dataset)
+{
+    if (rend_scheme_fits(dataset, look, NULL)) return;
+    look->colour = REND_COLOUR_RGB;
+    look->has_range = false, look->map = REND_MAP_USUAL; /* neither is for stored colours */
 }
 
 void rend_look_text(const rend_look *look, char *out, size_t size)

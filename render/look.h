@@ -25,11 +25,13 @@ void rend_look_keep(const rend_look *look, const rend_look *opening, rend_key *k
 
 /* The look of a moment on a path.
  * opening  as the window opened
- * colour   NULL or "": as it is
- * clip     NULL: as when the window opened
- * choices  [count], as above */
+ * colour   NULL, "" or what the dataset cannot show: as it is
+ * clip     NULL: as when the window opened */
 void rend_look_recall(rend_look *look, const rend_look *opening, const char *colour,
-                      const rend_box *clip, const rend_choice *choices, uint32_t count);
+                      const rend_box *clip, const mospt_dataset *dataset);
+
+/* Colours that another dataset cannot show become those that every one has. */
+void rend_look_fit(rend_look *look, const mospt_dataset *dataset);
 
 /* Colours, size and shading in words. */
 void rend_look_text(const rend_look *look, char *out, size_t size);

@@ -11,6 +11,15 @@ static bool is_same_grid(const mospt_grid *a, const mospt_grid *b)
     return same;
 }
 
+static bool is_same_schema(const mospt_schema *a, const mospt_schema *b)
+{
+    bool same = a->count == b->count;
+    for (uint32_t i = 0; same && i < a->count; i++)
+        same = strcmp(a->at[i].name, b->at[i].name) == 0 && a->at[i].type == b->at[i].type &&
+               a->at[i].components == b->at[i].components;
+    return same;
+}
+
 static bool is_same_payload(const mospt_node *a, const mospt_node *b)
 {
     return a->count == b->count && a->vertices_hash == b->vertices_hash &&
@@ -34,6 +43,7 @@ static void pair_cells(const mospt_hierarchy *before, const mospt_hierarchy *aft
 void rend_match_nodes(const mospt_dataset *before, const mospt_dataset *after, uint32_t *to)
 {
     bool comparable = is_same_grid(&before->metadata.grid, &after->metadata.grid) &&
+                      is_same_schema(&before->metadata.schema, &after->metadata.schema) &&
                       before->hierarchy.inner_depth == after->hierarchy.inner_depth;
     pair_cells(&before->hierarchy, &after->hierarchy, to);
     for (uint32_t n = 0; n < before->hierarchy.count; n++)

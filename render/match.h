@@ -5,6 +5,6 @@
 #pragma once
 #include "mospt/dataset.h"
 
-/* Pairs nodes of the same cell and the same bytes.
+/* Pairs nodes of the same cell and the same bytes, if bytes mean the same in both.
  * to       out: [before->hierarchy.count] index in `after`, or MOSPT_NO_NODE */
 void rend_match_nodes(const mospt_dataset *before, const mospt_dataset *after, uint32_t *to);

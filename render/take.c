@@ -159,16 +159,6 @@ static void flatten_background(rend_look *look)
     look->has_background = true;
 }
 
-/* A range and a map are for the colours that they were given with. */
-static void show_colours(const char *colour, rend_look *look)
-{
-    rend_look other = *look;
-    rend_choice_read(colour, &other);
-    if (rend_choice_same(&other, look)) return;
-    other.has_range = false, other.map = REND_MAP_USUAL;
-    *look = other;
-}
-
 static uint64_t budget_of(const rend_take *t, const rend_moment *moment)
 {
     uint64_t most =
@@ -191,7 +181,7 @@ bool rend_take_view(const rend_take *take, const rend_curve *curve, double time_
     out->camera = moment.camera;
     out->width = take->pass_width * take->samples, out->height = take->pass_height * take->samples;
     out->look = o->look;
-    if (moment.colour != NULL) show_colours(moment.colour, &out->look);
+    if (moment.colour != NULL) rend_choice_recall(moment.colour, &o->look, &out->look);
     if (moment.has_clip) out->look.has_clip = true, out->look.clip = moment.clip;
     out->budget_points = budget == REND_ALL ? REND_ALL : budget / take->views;
     out->min_node_px = o->limits.min_node_px;

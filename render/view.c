@@ -3,6 +3,7 @@
 #include "render/engine.h"
 #include "render/gl/text.h"
 #include "render/gl/window.h"
+#include "render/hands.h"
 #include "render/hud.h"
 #include "render/image.h"
 #include "render/look.h"
@@ -21,15 +22,8 @@
 
 enum { TEXT_PX = 14, PICK_RADIUS_PX = 6, NOTICE_S = 4 };
 #define BUDGET_MIN UINT64_C(10000)
-#define STOP_ASKED_S 0.25       /* between two looks at whether to stop */
-#define WATCH_S 1.0             /* between two looks at whether the dataset has changed */
-#define FLY_DISTANCES_PER_S 0.6 /* of the distance to the target */
-#define FLY_FASTER 4
-#define ZOOM_PER_STEP 0.85
-#define RAD_PER_DEG (3.14159265358979323846 / 180)
-#define FOV_MIN_RAD (5 * RAD_PER_DEG) /* of the lens */
-#define FOV_MAX_RAD (120 * RAD_PER_DEG)
-#define TURN_RAD_PER_PX 0.006 /* at 720 lines: half a turn for three quarters of the height */
+#define STOP_ASKED_S 0.25 /* between two looks at whether to stop */
+#define WATCH_S 1.0       /* between two looks at whether the dataset has changed */
 
 typedef struct {
     const mospt_dataset *dataset;
@@ -50,14 +44,10 @@ typedef struct {
     bool help, no_legend, quit, dirty;
     rend_strip strip;
     bool budget_changed;
-
-    /* A drag in hand. */
-    enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN } drag;
-    double cursor[2], pivot[3], grip_w; /* metres */
+    rend_hands hands;
 
     atomic_bool loaded; /* set by the loader's threads: the next frame shows more */
     rend_progress progress;
-    double flown_at; /* seconds; 0: not flying */
     rend_motion motion;
     double frame_ms, notice_until;
     char notice[1200];
@@ -80,26 +70,24 @@ static void tell(viewer *v, const char *what)
 
 /* ---- where things are ---- */
 
-/* Distance along the view axis, metres, of the nearest point around the cursor; that of the target
- * over empty space. */
-static double distance_at(viewer *v, double x, double y, bool *hit)
+/* The nearest point around the cursor. */
+static rend_spot spot_at(viewer *v, double x, double y)
 {
     float depths[(2 * PICK_RADIUS_PX + 1) * (2 * PICK_RADIUS_PX + 1)], nearest = 1;
     if (rgl_read_depth(v->engine.gl, (int)x, (int)y, PICK_RADIUS_PX, depths, NULL))
         for (size_t i = 0; i < sizeof depths / sizeof *depths; i++)
             nearest = fminf(nearest, depths[i]);
-    *hit = nearest < 1;
-    if (!*hit) return rend_orbit_distance(&v->view.camera);
-    return (double)rend_frame_depth_to_w(rend_stage_last_frame(v->stage), nearest) *
-           v->dataset->metadata.grid.step;
+    rend_spot spot = {.is_point = nearest < 1, .w = rend_orbit_distance(&v->view.camera)};
+    if (spot.is_point)
+        spot.w = (double)rend_frame_depth_to_w(rend_stage_last_frame(v->stage), nearest) *
+                 v->dataset->metadata.grid.step;
+    rend_orbit_unproject(&v->view.camera, x, y, spot.w, v->view.width, v->view.height, spot.at);
+    return spot;
 }
 
-static bool point_at(viewer *v, double x, double y, double out[3])
+static double nearest_distance(const viewer *v)
 {
-    bool hit;
-    double w = distance_at(v, x, y, &hit);
-    rend_orbit_unproject(&v->view.camera, x, y, w, v->view.width, v->view.height, out);
-    return hit;
+    return 16 * v->dataset->metadata.grid.step;
 }
 
 /* ---- hands ---- */
@@ -112,11 +100,8 @@ static void touch_camera(viewer *v)
 
 static void start_drag(viewer *v, const rgl_event *e)
 {
-    bool hit;
-    v->drag = e->button == RGL_BUTTON_LEFT && !e->shift ? DRAG_ORBIT : DRAG_PAN;
-    v->grip_w = distance_at(v, e->x, e->y, &hit);
-    if (!point_at(v, e->x, e->y, v->pivot))
-        memcpy(v->pivot, v->view.camera.target, sizeof v->pivot);
+    rend_spot spot = spot_at(v, e->x, e->y);
+    rend_hands_grip(&v->hands, e->button != RGL_BUTTON_LEFT || e->shift, &spot, &v->view.camera);
 }
 
 /* What is seen, as a keyframe: with what was changed since the window opened. */
@@ -141,7 +126,7 @@ static void look_through(viewer *v, const rend_camera *camera, const char *colou
 {
     if (memcmp(camera, &v->view.camera, sizeof *camera) != 0) touch_camera(v);
     v->view.camera = *camera;
-    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->choices, v->choice_count);
+    rend_look_recall(&v->view.look, &v->options->look, colour, clip, v->dataset);
     tell_of_strip(v);
 }
 
@@ -173,24 +158,13 @@ static void release_strip(viewer *v)
 static void move_cursor(viewer *v, const rgl_event *e)
 {
     if (rend_strip_drag(&v->strip, e->x, v->view.width)) v->dirty = true;
-    double dx = e->x - v->cursor[0], dy = e->y - v->cursor[1];
-    double turn = TURN_RAD_PER_PX * 720 / v->view.height;
-    if (v->drag == DRAG_ORBIT) rend_orbit_turn(&v->view.camera, v->pivot, dx * turn, dy * turn);
-    if (v->drag == DRAG_PAN) rend_orbit_pan(&v->view.camera, dx, dy, v->grip_w, v->view.height);
-    if (v->drag != DRAG_NONE) touch_camera(v);
-    v->cursor[0] = e->x, v->cursor[1] = e->y;
-}
-
-static double nearest_distance(const viewer *v)
-{
-    return 16 * v->dataset->metadata.grid.step;
+    if (rend_hands_move(&v->hands, e->x, e->y, v->view.height, &v->view.camera)) touch_camera(v);
 }
 
 static void scroll(viewer *v, const rgl_event *e)
 {
-    double towards[3];
-    point_at(v, e->x, e->y, towards);
-    rend_orbit_zoom(&v->view.camera, towards, pow(ZOOM_PER_STEP, e->dy), nearest_distance(v));
+    rend_spot spot = spot_at(v, e->x, e->y);
+    rend_hands_zoom(e->dy, &spot, nearest_distance(v), &v->view.camera);
     touch_camera(v);
 }
 
@@ -205,25 +179,33 @@ static void scale_budget(viewer *v, double factor)
     rend_motion_restart(&v->motion);
 }
 
+/* What was drawn last.
+ * shown    with the words, as the window has it */
+static bool write_picture(viewer *v, bool shown, const char *path, mospt_err *err)
+{
+    size_t size = (size_t)v->view.width * v->view.height * 3;
+    uint8_t *rgb = malloc(size);
+    bool ok = rgb != NULL || mospt_err_nomem(err, size);
+    ok = ok && rgl_read_pixels(v->engine.gl, shown, v->view.width, v->view.height, rgb, err) &&
+         rend_image_write(path, rgb, v->view.width, v->view.height, err);
+    free(rgb);
+    return ok;
+}
+
 static void save_picture(viewer *v)
 {
     char name[64], text[1100];
     time_t now = time(NULL);
     struct tm local;
     mospt_err err = {0};
-    size_t size = (size_t)v->view.width * v->view.height * 3;
-    uint8_t *rgb = malloc(size);
     rend_view_of still = v->view;
     rend_progress ignored;
     still.parts = 0;
     localtime_r(&now, &local);
     strftime(name, sizeof name, "instantpoints-%Y%m%d-%H%M%S.png", &local);
-    bool ok = rgb != NULL || mospt_err_nomem(&err, size);
-    ok = ok && rend_stage_frame(v->stage, &still, NULL, &ignored, &err) &&
-         rgl_read_pixels(v->engine.gl, false, still.width, still.height, rgb, &err) &&
-         rend_image_write(name, rgb, still.width, still.height, &err);
-    free(rgb);
-    if (ok) snprintf(text, sizeof text, "saved %s", name);
+    if (rend_stage_frame(v->stage, &still, NULL, &ignored, &err) &&
+        write_picture(v, false, name, &err))
+        snprintf(text, sizeof text, "saved %s", name);
     else mospt_err_text(&err, text, sizeof text);
     tell(v, text);
 }
@@ -248,18 +230,17 @@ static void press_look_key(viewer *v, int key, bool shift)
 
 static void cut(viewer *v, bool undo)
 {
-    double place[3];
-    if (!undo && !point_at(v, v->cursor[0], v->cursor[1], place))
-        tell(v, "nothing to cut at under the cursor");
-    else rend_look_cut(&v->view.look, &v->view.camera, undo ? NULL : place);
+    rend_spot spot = {0};
+    if (!undo) spot = spot_at(v, v->hands.cursor[0], v->hands.cursor[1]);
+    if (!undo && !spot.is_point) tell(v, "nothing to cut at under the cursor");
+    else rend_look_cut(&v->view.look, &v->view.camera, undo ? NULL : spot.at);
 }
 
 static void change_lens(viewer *v, double factor)
 {
     char text[64];
-    double fov_rad = fmin(fmax(v->view.camera.fov_rad * factor, FOV_MIN_RAD), FOV_MAX_RAD);
-    v->view.camera.fov_rad = fov_rad;
-    snprintf(text, sizeof text, "field of view %.0f degrees", fov_rad / RAD_PER_DEG);
+    snprintf(text, sizeof text, "field of view %.0f degrees",
+             rend_hands_lens(factor, &v->view.camera));
     tell(v, text);
     touch_camera(v);
 }
@@ -288,8 +269,8 @@ static void handle(viewer *v, const rgl_event *e)
         press_key(v, e);
         break;
     case RGL_EVENT_BUTTON:
-        v->cursor[0] = e->x, v->cursor[1] = e->y;
-        if (!e->down) v->drag = DRAG_NONE, release_strip(v);
+        v->hands.cursor[0] = e->x, v->hands.cursor[1] = e->y;
+        if (!e->down) rend_hands_release(&v->hands), release_strip(v);
         else if (!grip_strip(v, e)) start_drag(v, e);
         break;
     case RGL_EVENT_MOVE:
@@ -312,28 +293,15 @@ static int is_held(const rgl_window *window, int key, int other)
     return rgl_window_is_down(window, key) || rgl_window_is_down(window, other);
 }
 
-/* Keys that are held. Speed follows the distance to the target, which flies along. */
-static bool fly(viewer *v)
+static void fly(viewer *v)
 {
     const rgl_window *w = v->window;
-    double by[3] = {is_held(w, 'D', RGL_KEY_RIGHT) - is_held(w, 'A', RGL_KEY_LEFT),
-                    is_held(w, 'E', 0) - is_held(w, 'Q', 0),
-                    is_held(w, 'W', RGL_KEY_UP) - is_held(w, 'S', RGL_KEY_DOWN)};
-    double now = rgl_window_seconds(),
-           elapsed = v->flown_at > 0 ? fmin(now - v->flown_at, 0.25) : 0.016;
-    if (by[0] == 0 && by[1] == 0 && by[2] == 0) {
-        v->flown_at = 0;
-        return false;
-    }
-    double speed =
-        FLY_DISTANCES_PER_S * fmax(rend_orbit_distance(&v->view.camera), nearest_distance(v));
-    if (rgl_window_is_down(w, RGL_KEY_SHIFT)) speed *= FLY_FASTER;
-    for (int a = 0; a < 3; a++)
-        by[a] *= speed * elapsed;
-    rend_orbit_fly(&v->view.camera, by);
-    v->flown_at = now;
-    touch_camera(v);
-    return true;
+    const int held[3] = {is_held(w, 'D', RGL_KEY_RIGHT) - is_held(w, 'A', RGL_KEY_LEFT),
+                         is_held(w, 'E', 0) - is_held(w, 'Q', 0),
+                         is_held(w, 'W', RGL_KEY_UP) - is_held(w, 'S', RGL_KEY_DOWN)};
+    if (rend_hands_fly(&v->hands, held, rgl_window_is_down(w, RGL_KEY_SHIFT), rgl_window_seconds(),
+                       nearest_distance(v), &v->view.camera))
+        touch_camera(v);
 }
 
 static void play(viewer *v)
@@ -388,17 +356,6 @@ static bool draw_points(viewer *v, bool last, mospt_err *err)
     return true;
 }
 
-static bool write_screenshot(viewer *v, mospt_err *err)
-{
-    size_t size = (size_t)v->view.width * v->view.height * 3;
-    uint8_t *rgb = malloc(size);
-    bool ok = rgb != NULL || mospt_err_nomem(err, size);
-    ok = ok && rgl_read_pixels(v->engine.gl, true, v->view.width, v->view.height, rgb, err) &&
-         rend_image_write(v->options->screenshot, rgb, v->view.width, v->view.height, err);
-    free(rgb);
-    return ok;
-}
-
 static bool is_last(const viewer *v)
 {
     return v->quit || (v->options->frames > 0 && v->result.frames + 1 >= v->options->frames);
@@ -437,7 +394,7 @@ static bool frame(viewer *v, mospt_err *err)
     fit_text(v);                    /* now: with another context, it is gone */
     if (v->progress != REND_PART) { /* else the picture before stays on the screen */
         if (!draw_words(v, err)) return false;
-        if (last && !write_screenshot(v, err)) return false;
+        if (last && !write_picture(v, true, v->options->screenshot, err)) return false;
         rgl_window_show(v->window);
     }
     count_frame(v, &before, (rgl_window_seconds() - start) * 1e3);
@@ -490,7 +447,7 @@ static bool take_newer(viewer *v, mospt_err *err)
     mospt_dataset_close(v->newer);
     v->dataset = v->newer = newer;
     v->choice_count = rend_choice_list(&newer->metadata, v->choices);
-    if (!rend_scheme_fits(newer, &v->view.look, NULL)) v->view.look.colour = REND_COLOUR_RGB;
+    rend_look_fit(&v->view.look, newer);
     v->result.swaps++;
     ok = ok &&
          rend_camera_make(&v->options->camera, newer, v->view.width, v->view.height, &v->home, err);
@@ -554,7 +511,7 @@ static bool run(viewer *v, mospt_err *err)
         play(v);
         if (!watch(v, err)) return false;
         tell_faults(v);
-        if (rend_motion_settle(&v->motion, v->drag != DRAG_NONE, rgl_window_seconds()))
+        if (rend_motion_settle(&v->motion, v->hands.drag != REND_DRAG_NONE, rgl_window_seconds()))
             v->dirty = true;
         if (v->notice[0] != '\0' && rgl_window_seconds() >= v->notice_until)
             v->notice[0] = '\0', v->dirty = true;

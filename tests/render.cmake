@@ -10,8 +10,8 @@ target_link_libraries(render_tools PUBLIC rend core_tools)
 set(render_environment
     "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/render_leaks.supp:print_suppressions=0")
 
-foreach(name cache camera clip curve loader occlusion orbit pace pages paint panorama path path_file ramp rushes scheme select
-    space stage strip sweep watch)
+foreach(name cache camera clip curve hands loader look motion occlusion orbit pace pages paint panorama path path_file ramp rushes
+    scheme select space stage strip sweep watch)
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE render_tools)
     add_test(NAME ${name} COMMAND test_${name})

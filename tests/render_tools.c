@@ -113,6 +113,30 @@ void render_more_make(uint32_t count, render_site *out)
     build(out, 2 * count);
 }
 
+void render_marked_make(uint32_t count, render_site *out)
+{
+    mospt_err err = {0};
+    core_site plain, *marked = &out->site;
+    core_site_make(CORE_CLUSTERED, 16, count, 7, &plain);
+    *out = (render_site){.site = {.grid = plain.grid, .count = count}};
+    CORE_NEED(mospt_schema_add(&marked->schema, "scan", MOSPT_U16, 1, &err));
+    CORE_NEED(mospt_schema_add(&marked->schema, "mark", MOSPT_U16, 1, &err));
+    CORE_NEED(mospt_schema_add(&marked->schema, "tag", MOSPT_U32, 1, &err));
+    marked->stride = mospt_record_size(&marked->schema);
+    marked->records = calloc(count + 1, marked->stride);
+    assert_non_null(marked->records);
+    size_t tag = plain.stride - 4;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint8_t *from = plain.records + i * plain.stride;
+        uint8_t *to = marked->records + i * marked->stride;
+        memcpy(to, from, tag);
+        memcpy(to + tag, &(uint16_t){(uint16_t)(7 * i)}, 2);
+        memcpy(to + tag + 2, from + tag, 4);
+    }
+    core_site_fini(&plain);
+    build(out, count);
+}
+
 void render_rooms_make(uint32_t count, render_site *out)
 {
     enum { ROOM = 1 << 13 };

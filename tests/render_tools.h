@@ -32,6 +32,9 @@ void render_rooms_make(uint32_t count, render_site *out);
 /* The first `count` points of render_site_make(CORE_CLUSTERED, count, ...), and as many again in
  * the upper half of x: below it, nodes stay as they were. */
 void render_more_make(uint32_t count, render_site *out);
+/* The points of render_site_make(CORE_CLUSTERED, count, ...) with one more attribute, "mark",
+ * before their "tag". */
+void render_marked_make(uint32_t count, render_site *out);
 void render_site_fini(render_site *site);
 
 /* Changes one byte of the first vertex of a node on disk. */

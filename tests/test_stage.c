@@ -695,6 +695,57 @@ static uint64_t picture_of(const render_site *site, const rend_look *look)
     return hash;
 }
 
+/* The dataset says something else of the same bytes. */
+static void trade_names(mospt_schema *schema)
+{
+    char name[MOSPT_ATTRIBUTE_NAME_MAX];
+    memcpy(name, schema->at[0].name, sizeof name);
+    memcpy(schema->at[0].name, schema->at[1].name, sizeof name);
+    memcpy(schema->at[1].name, name, sizeof name);
+}
+
+/* A paint knows its attribute by number, a look by name. */
+static void attributes_may_stand_elsewhere_in_another_generation(void **unused)
+{
+    (void)unused;
+    enum { MARKED, TRADED, RETYPED, NEWER };
+    render_site site, newer[NEWER];
+    mospt_err err = {0};
+    const rend_limits limits[] = {{0}, {.ram_cache_bytes = 1}};
+    const rend_look looks[] = {
+        {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag"},
+        {.colour = REND_COLOUR_ATTRIBUTE, .attribute = "tag", .has_range = true, .range = {0, 3e4}},
+    };
+    render_site_make(CORE_CLUSTERED, 30000, NULL, &site);
+    render_marked_make(30000, &newer[MARKED]);
+    for (int n = TRADED; n < NEWER; n++)
+        render_site_make(CORE_CLUSTERED, 30000, NULL, &newer[n]);
+    trade_names(&newer[TRADED].dataset->metadata.schema);
+    mospt_attribute *tag = &newer[RETYPED].dataset->metadata.schema.at[1];
+    tag->type = MOSPT_I8, tag->components = 4;
+    for (int n = 0; n < NEWER; n++)
+        for (int i = 0; i < 4; i++) {
+            scene s;
+            uint64_t before = picture_of(&site, &looks[i % 2]);
+            uint64_t after = picture_of(&newer[n], &looks[i % 2]);
+            assert_true((before == after) == (n == MARKED));
+            start(&site, &limits[i / 2], &s);
+            s.view.look = looks[i % 2];
+            converge(&s);
+            assert_true(rgl_null_record(s.gl).picture_hash == before);
+            CORE_NEED(rend_stage_swap(s.stage, newer[n].dataset, &err));
+            converge(&s);
+            assert_true(rgl_null_record(s.gl).picture_hash == after);
+            CORE_NEED(rend_stage_swap(s.stage, site.dataset, &err));
+            converge(&s);
+            assert_true(rgl_null_record(s.gl).picture_hash == before);
+            stop(&s);
+        }
+    for (int n = 0; n < NEWER; n++)
+        render_site_fini(&newer[n]);
+    render_site_fini(&site);
+}
+
 /* In frames and in stills, with all in the caches and with next to nothing. */
 static void repainted_points_are_those_of_a_fresh_start(void **unused)
 {
@@ -785,6 +836,7 @@ int main(void)
         cmocka_unit_test(a_damaged_node_is_counted_once_and_left_out),
         cmocka_unit_test(one_point_is_a_picture),
         cmocka_unit_test(new_colours_replace_the_old_ones_without_a_gap),
+        cmocka_unit_test(attributes_may_stand_elsewhere_in_another_generation),
         cmocka_unit_test(repainted_points_are_those_of_a_fresh_start),
         cmocka_unit_test(colours_that_cannot_be_shown_change_nothing),
         cmocka_unit_test(damaged_attributes_are_damage_only_where_they_are_shown),
