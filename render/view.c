@@ -251,7 +251,7 @@ static void press_key(viewer *v, const rgl_event *e)
     if (press_strip_key(v, e)) return;
     if (e->key == RGL_KEY_ESCAPE || (e->key == 'W' && e->control)) v->quit = true;
     else if (e->key == 'H' || e->key == RGL_KEY_F1 || e->key == '?') v->help = !v->help;
-    else if (e->key == 'R') v->view.camera = v->home;
+    else if (e->key == 'R') v->view.camera = v->home, touch_camera(v);
     else if (e->key == 'B') scale_budget(v, e->shift ? 0.5 : 2);
     else if (e->key == ']') scale_budget(v, 1.25);
     else if (e->key == '[') scale_budget(v, 0.8);

@@ -6,9 +6,10 @@
  *
  * Flies around the site and through it within N seconds (40), first cold - the dataset is dropped
  * from the page cache, as far as the system obliges -, then again with what the caches hold. A GPU
- * cache of a tenth of the points, unless given. Prints for each: milliseconds of frames, those that
- * came too late for the rate, points drawn, nodes missed in a frame, megabytes read and uploaded;
- * and how long a plain loop over as many points takes, at the same rate: the machine's own share.
+ * cache of a tenth of the points, unless given. Prints for each: how long frames took to make, and
+ * how long each was the one to be seen, until the next was done; those that came too late for the
+ * rate, points drawn, nodes missed in a frame, megabytes read and uploaded; and the same of a plain
+ * loop over as many points, at the same rate: the machine's own share.
  */
 #include "render/engine.h"
 #include "render/pace.h"
@@ -38,7 +39,9 @@ typedef struct {
     rend_stage *stage;
     rend_pace pace;
     uint32_t frames;
-    double *ms; /* [frames] */
+    double *ms;   /* [2][frames], owned: to make each, and `seen` */
+    double *seen; /* [frames] until the next was done; of the last one, 0 */
+    double done;  /* when the frame before was, of bench_now_ms() */
 } bench;
 
 static void wait_until(double ms)
@@ -60,6 +63,16 @@ static void drop_from_cache(const char *folder)
     if (dir != NULL) closedir(dir);
 }
 
+/* The frame that was begun at `start` is done. */
+static void note_frame(bench *b, uint32_t i, double start)
+{
+    double now = bench_now_ms();
+    b->ms[i] = now - start;
+    b->seen[i] = 0;
+    if (i > 0) b->seen[i - 1] = now - b->done;
+    b->done = now;
+}
+
 static bool fly_frame(bench *b, uint32_t i, uint64_t *points, mospt_err *err)
 {
     rend_progress progress;
@@ -75,7 +88,7 @@ static bool fly_frame(bench *b, uint32_t i, uint64_t *points, mospt_err *err)
     if (!rend_stage_frame(b->stage, &view, &allowed, &progress, err) ||
         !rgl_read_depth(b->engine.gl, 0, 0, 0, &depth, err)) /* waits for all that was drawn */
         return false;
-    b->ms[i] = bench_now_ms() - start;
+    note_frame(b, i, start);
     rend_stage_figures(b->stage, &after);
     *points = after.points_drawn;
     rend_pace_note(&b->pace, after.points_total - before.points_total,
@@ -83,12 +96,18 @@ static bool fly_frame(bench *b, uint32_t i, uint64_t *points, mospt_err *err)
     return true;
 }
 
-static void print_ms(bench *b, const char *name)
+static void print_times(double *ms, uint32_t n)
 {
-    uint32_t n = b->frames;
-    bench_sort(b->ms, n);
-    double median = b->ms[n / 2], p99 = b->ms[n * 99 / 100];
-    printf("%-6s %7u %8.1f %8.1f %6.2f %8.1f", name, n, median, p99, p99 / median, b->ms[n - 1]);
+    bench_sort(ms, n);
+    double median = ms[n / 2], p99 = ms[n * 99 / 100];
+    printf(" %7.1f %7.1f %5.2f %7.1f", median, p99, p99 / median, ms[n - 1]);
+}
+
+static void print_frames(bench *b, const char *name)
+{
+    printf("%-6s %6u", name, b->frames);
+    print_times(b->ms, b->frames);
+    print_times(b->seen, b->frames);
 }
 
 static bool fly(bench *b, const char *name, mospt_err *err)
@@ -106,7 +125,7 @@ static bool fly(bench *b, const char *name, mospt_err *err)
         rend_stage_figures(b->stage, &f);
         points += (double)drawn, missing += f.pending, late += b->ms[i] > frame_ms;
     }
-    print_ms(b, name);
+    print_frames(b, name);
     printf(" %7.2f %7.2f %7.1f %8.1f %8.1f\n", 100.0 * late / n, points / n * 1e-6, missing / n,
            (double)(f.loaded_bytes - before.loaded_bytes) * 1e-6,
            (double)(f.uploaded_bytes - before.uploaded_bytes) * 1e-6);
@@ -148,11 +167,11 @@ static bool loop(bench *b, const mospt_dataset *dataset, mospt_err *err)
         double start = bench_now_ms();
         next = start + frame_ms;
         plain_loop_draw(l, &frame, vertices, count);
-        b->ms[i] = bench_now_ms() - start;
+        note_frame(b, i, start);
     }
     plain_loop_destroy(l);
     free(vertices);
-    if (ok) print_ms(b, "loop"), printf("\n");
+    if (ok) print_frames(b, "loop"), printf("\n");
     return ok;
 }
 
@@ -161,8 +180,9 @@ static bool run(const options *o, mospt_err *err)
     bench b = {.o = o, .frames = (uint32_t)(o->seconds * o->fps)};
     const rend_view_of *v = &o->common.view;
     mospt_dataset *dataset = NULL;
-    b.ms = calloc(b.frames, sizeof *b.ms);
-    bool ok = (b.ms != NULL || mospt_err_nomem(err, b.frames * sizeof *b.ms)) &&
+    b.ms = calloc(2 * (size_t)b.frames, sizeof *b.ms);
+    b.seen = b.ms != NULL ? b.ms + b.frames : NULL;
+    bool ok = (b.ms != NULL || mospt_err_nomem(err, 2 * b.frames * sizeof *b.ms)) &&
               mospt_dataset_open(o->common.dataset, &dataset, err) &&
               bench_flight_make(dataset, (double)v->width / v->height, &b.flight, err) &&
               rend_engine_open(&o->common.engine, &b.engine, err);
@@ -178,8 +198,9 @@ static bool run(const options *o, mospt_err *err)
                rgl_renderer(b.engine.gl), v->width, v->height,
                (double)dataset->metadata.point_count * 1e-6, (double)v->budget_points * 1e-6,
                o->fps);
-        printf("%-6s %7s %8s %8s %6s %8s %7s %7s %7s %8s %8s\n", "", "frames", "med ms", "p99 ms",
-               "/med", "slowest", "late %", "M pts", "misses", "MB read", "MB up");
+        printf("%-6s %6s %7s %7s %5s %7s %7s %7s %5s %7s %7s %7s %7s %8s %8s\n", "", "frames",
+               "made ms", "p99", "/med", "most", "seen ms", "p99", "/med", "most", "late %",
+               "M pts", "misses", "MB read", "MB up");
         ok = fly(&b, "cold", err) && fly(&b, "again", err) && loop(&b, dataset, err);
     }
     rend_stage_destroy(b.stage);
