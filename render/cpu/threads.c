@@ -19,6 +19,7 @@ typedef struct {
 
 struct rcpu_threads {
     uint32_t count;   /* with the caller */
+    int64_t spin_ns;  /* 0 where there are more threads than processors */
     worker *workers;  /* [count], owned; the caller is number 0 */
     uint32_t made;    /* threads to join */
     atomic_uint next; /* the next job of the round */
@@ -53,9 +54,9 @@ static int64_t now_ns(void)
 }
 
 /* Waits for a little while until the round is this one, or is not. */
-static bool spin(const atomic_uint *round, uint32_t value, bool is)
+static bool spin(const rcpu_threads *t, const atomic_uint *round, uint32_t value, bool is)
 {
-    for (int64_t end = now_ns() + SPIN_NS; now_ns() < end;)
+    for (int64_t end = now_ns() + t->spin_ns; now_ns() < end;)
         for (int i = 0; i < SPINS_PER_LOOK; i++, relax())
             if ((atomic_load_explicit(round, memory_order_acquire) == value) == is) return true;
     return false;
@@ -73,7 +74,7 @@ static void *work(void *argument)
     worker *w = argument;
     rcpu_threads *t = w->threads;
     for (uint32_t seen = 0;;) {
-        spin(&t->begun_round, seen, false);
+        spin(t, &t->begun_round, seen, false);
         pthread_mutex_lock(&t->lock);
         while (!t->stop && t->round == seen)
             pthread_cond_wait(&t->begun, &t->lock);
@@ -100,7 +101,8 @@ static uint32_t count_processors(void)
 
 bool rcpu_threads_create(uint32_t count, rcpu_threads **out, mospt_err *err)
 {
-    if (count == 0) count = count_processors();
+    uint32_t processors = count_processors();
+    if (count == 0) count = processors;
     if (count > THREADS_MAX) count = THREADS_MAX;
     rcpu_threads *t = calloc(1, sizeof *t);
     worker *workers = calloc(count, sizeof *workers);
@@ -109,6 +111,7 @@ bool rcpu_threads_create(uint32_t count, rcpu_threads **out, mospt_err *err)
         return mospt_err_nomem(err, count * sizeof *workers);
     }
     t->count = count, t->workers = workers;
+    t->spin_ns = count <= processors ? SPIN_NS : 0;
     pthread_mutex_init(&t->lock, NULL);
     pthread_cond_init(&t->begun, NULL);
     pthread_cond_init(&t->ended, NULL);
@@ -165,7 +168,7 @@ void rcpu_threads_run(rcpu_threads *threads, uint32_t workers, uint32_t job_coun
     pthread_mutex_unlock(&t->lock);
     if (workers > 1) atomic_store_explicit(&t->begun_round, t->round, memory_order_release);
     take_jobs(t, 0);
-    if (workers <= 1 || spin(&t->ended_round, t->round, true)) return;
+    if (workers <= 1 || spin(t, &t->ended_round, t->round, true)) return;
     pthread_mutex_lock(&t->lock);
     while (t->busy > 0)
         pthread_cond_wait(&t->ended, &t->lock);
