@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 /* Ahead of what is filled, and at a time. */
-enum { AHEAD_SIZE = 32 << 20, PIECE_SIZE = 2 << 20, BEHIND_ALL = 19 /* nice */ };
+enum { AHEAD_SIZE = 16 << 20, PIECE_SIZE = 2 << 20, BEHIND_ALL = 19 /* nice */ };
 
 struct rcpu_touch {
     uint8_t *memory; /* [size] */
