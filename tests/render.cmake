@@ -11,7 +11,7 @@ set(render_environment
     "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_SOURCE_DIR}/render_leaks.supp:print_suppressions=0")
 
 foreach(name cache camera clip curve hands loader look motion occlusion orbit pace pages paint panorama path path_file ramp rushes
-    scheme select space stage strip sweep watch)
+    scheme select space stage strip sweep touch watch)
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE render_tools)
     add_test(NAME ${name} COMMAND test_${name})
