@@ -22,15 +22,12 @@ static size_t present(const uint8_t *memory, size_t from)
 /* Not every system can, or tells. */
 static bool can_be_seen(void)
 {
-#ifdef MADV_POPULATE_WRITE
     uint8_t *memory = rcpu_memory_take(PART);
-    bool can = present(memory, 0) == 0 && madvise(memory, PART, MADV_POPULATE_WRITE) == 0 &&
-               present(memory, 0) == PART;
+    size_t before = present(memory, 0);
+    rcpu_memory_touch(memory, PART);
+    bool can = before == 0 && present(memory, 0) == PART;
     rcpu_memory_release(memory, PART);
     return can;
-#else
-    return false;
-#endif
 }
 
 static bool comes(const uint8_t *memory, size_t from)

@@ -1,6 +1,8 @@
 #include "render/cpu/memory.h"
 
+#include <stdint.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 void *rcpu_memory_take(size_t size)
 {
@@ -14,4 +16,14 @@ void *rcpu_memory_take(size_t size)
 void rcpu_memory_release(void *memory, size_t size)
 {
     if (memory != NULL) munmap(memory, size);
+}
+
+void rcpu_memory_touch(void *memory, size_t size)
+{
+#ifdef MADV_POPULATE_WRITE
+    uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)memory / page * page;
+    madvise((void *)begin, (uintptr_t)memory + size - begin, MADV_POPULATE_WRITE); /* only a wish */
+#else
+    (void)memory, (void)size;
+#endif
 }

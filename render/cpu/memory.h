@@ -6,3 +6,6 @@
 /* Zeroed; NULL without memory. */
 void *rcpu_memory_take(size_t size);
 void rcpu_memory_release(void *memory, size_t size);
+
+/* Has the system give all pages of a part now, where it can; what is in them stays. */
+void rcpu_memory_touch(void *memory, size_t size);

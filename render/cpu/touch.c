@@ -1,10 +1,11 @@
 #include "render/cpu/touch.h"
 
+#include "render/cpu/memory.h"
+
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -23,16 +24,6 @@ struct rcpu_touch {
     bool quit;
 };
 
-static void touch_piece(uint8_t *memory, size_t size)
-{
-#ifdef MADV_POPULATE_WRITE
-    uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE), begin = (uintptr_t)memory / page * page;
-    madvise((void *)begin, (uintptr_t)memory + size - begin, MADV_POPULATE_WRITE);
-#else
-    (void)memory, (void)size;
-#endif
-}
-
 static void *work(void *argument)
 {
     rcpu_touch *t = argument;
@@ -48,7 +39,7 @@ static void *work(void *argument)
         uint8_t *piece = t->memory + t->touched;
         t->touched += size;
         pthread_mutex_unlock(&t->lock);
-        touch_piece(piece, size);
+        rcpu_memory_touch(piece, size);
         pthread_mutex_lock(&t->lock);
     }
     pthread_mutex_unlock(&t->lock);
