@@ -137,6 +137,8 @@ void rend_choice_use(const rend_choice *choice, rend_look *look)
 {
     look->colour = choice->colour;
     name_attribute(choice->attribute, look);
+    look->has_range = false;
+    look->map = REND_MAP_USUAL;
 }
 
 void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend_look *look)
@@ -146,8 +148,6 @@ void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend
         at++;
     at = at == count ? 0 : (uint32_t)((int)(at + count) + step) % count;
     rend_choice_use(&choices[at], look);
-    look->has_range = false;
-    look->map = REND_MAP_USUAL;
 }
 
 rend_map rend_choice_map(const rend_look *look)

@@ -30,7 +30,7 @@ uint32_t rend_choice_list(const mospt_metadata *metadata, rend_choice *out);
 /* The name of one, whichever kind it is; borrowed from it. */
 const char *rend_choice_text(const rend_choice *choice);
 
-/* Has a look show it; range and map stay. */
+/* Has a look show it, with its usual range and map. */
 void rend_choice_use(const rend_choice *choice, rend_look *look);
 
 /* Has a look show what a keyframe names, as rend_choice_read(). A range and a map are for the
@@ -44,8 +44,7 @@ const char *rend_choice_shown(const rend_look *look);
 /* True if the colours of two looks show the same, whatever their ranges and maps. */
 bool rend_choice_same(const rend_look *a, const rend_look *b);
 
-/* Changes a look to the next one of a list (step 1) or the one before (step -1), with its usual
- * range and map. */
+/* Changes a look to the next one of a list (step 1) or the one before (step -1). */
 void rend_choice_step(const rend_choice *choices, uint32_t count, int step, rend_look *look);
 
 /* The colour map that a look uses for values: its own, or the usual one. */

@@ -32,8 +32,7 @@ bool rend_look_press_colour(rend_look *look, int key, bool shift, const rend_cho
     if (key == 'C') {
         rend_choice_step(choices, count, shift ? -1 : 1, look);
     } else if (key >= '1' && key <= '9') {
-        rend_choice_read(rend_choice_name((rend_colour)(key - '1')), look);
-        look->has_range = false, look->map = REND_MAP_USUAL;
+        rend_choice_use(&(rend_choice){.colour = (rend_colour)(key - '1')}, look);
     } else if (key == 'M') {
         look->map = (rend_map)(rend_choice_map(look) % (REND_MAP_COUNT - 1) + 1);
     } else if (key == ',' || key == '.') {
@@ -74,9 +73,8 @@ void rend_look_recall(rend_look *look, const rend_look *opening, const char *col
 
 void rend_look_fit(rend_look *look, const mospt_dataset *dataset)
 {
-    if (rend_scheme_fits(dataset, look, NULL)) return;
-    look->colour = REND_COLOUR_RGB;
-    look->has_range = false, look->map = REND_MAP_USUAL; /* neither is for stored colours */
+    if (!rend_scheme_fits(dataset, look, NULL))
+        rend_choice_use(&(rend_choice){.colour = REND_COLOUR_RGB}, look);
 }
 
 void rend_look_text(const rend_look *look, char *out, size_t size)
