@@ -69,12 +69,12 @@ bool mospt_file_write_at(int fd, const char *path, uint64_t offset, const void *
     return true;
 }
 
-void mospt_file_start_flush(int fd, uint64_t offset, uint64_t size)
+void mospt_file_start_flush(int fd)
 {
 #ifdef __linux__
-    (void)!sync_file_range(fd, (off_t)offset, (off_t)size, SYNC_FILE_RANGE_WRITE);
+    (void)!sync_file_range(fd, 0, 0, SYNC_FILE_RANGE_WRITE);
 #else
-    (void)fd, (void)offset, (void)size;
+    (void)fd;
 #endif
 }
 

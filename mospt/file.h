@@ -17,9 +17,9 @@ bool mospt_file_read_at(int fd, const char *path, uint64_t offset, void *out, si
 bool mospt_file_write_at(int fd, const char *path, uint64_t offset, const void *bytes, size_t size,
                          mospt_err *err);
 
-/* Asks for bytes to go to the disk soon, so that flushing the file later finds little left to do.
- */
-void mospt_file_start_flush(int fd, uint64_t offset, uint64_t size);
+/* Asks for what was written to go to the disk soon, so that flushing the file later finds little
+ * left to do. */
+void mospt_file_start_flush(int fd);
 
 /* Reads a whole file of at most `max_size` bytes; `*out` is owned by the caller and ends in a zero
  * byte beyond `*size`. */

@@ -49,6 +49,7 @@ struct mospt_writer {
     int fd[FILES_MAX];
     uint64_t size[FILES_MAX];
     uint64_t unflushed[FILES_MAX]; /* bytes that were written since the last flush began */
+    bool unstarted[FILES_MAX];     /* some of these since the disk was last asked to take them */
 };
 
 static bool is_unfinished(const char *name)
@@ -234,11 +235,7 @@ void mospt_writer_complete(mospt_writer *w, uint32_t index, const mospt_node *no
 bool mospt_writer_write(mospt_writer *w, const mospt_node *node, const uint8_t *payload,
                         mospt_err *err)
 {
-    if (!mospt_writer_write_part(w, node, 0, payload, (size_t)node->payload_size, err))
-        return false;
-    if (w->sink == NULL)
-        mospt_file_start_flush(w->fd[node->payload_file], node->payload_offset, node->payload_size);
-    return true;
+    return mospt_writer_write_part(w, node, 0, payload, (size_t)node->payload_size, err);
 }
 
 bool mospt_writer_write_part(mospt_writer *w, const mospt_node *node, uint64_t skip,
@@ -250,6 +247,7 @@ bool mospt_writer_write_part(mospt_writer *w, const mospt_node *node, uint64_t s
                               : mospt_file_write_at(w->fd[file], w->path, offset, bytes, size, err);
     pthread_mutex_lock(&w->lock);
     w->unflushed[file] += size;
+    w->unstarted[file] = true;
     pthread_mutex_unlock(&w->lock);
     return ok;
 }
@@ -262,6 +260,17 @@ static bool flush_file(mospt_writer *w, uint32_t file, mospt_err *err)
     return fsync(w->fd[file]) == 0 ||
            mospt_err_set(err, MOSPT_EIO, mospt_at_file(w->path),
                          PAYLOAD_NAME " cannot be flushed to the disk", file);
+}
+
+void mospt_writer_start_flush(mospt_writer *w)
+{
+    for (uint32_t i = 0; w->sink == NULL && i < FILES_MAX; i++) {
+        pthread_mutex_lock(&w->lock);
+        bool is_new = w->unstarted[i];
+        w->unstarted[i] = false;
+        pthread_mutex_unlock(&w->lock);
+        if (is_new) mospt_file_start_flush(w->fd[i]);
+    }
 }
 
 bool mospt_writer_flush(mospt_writer *w, mospt_err *err)

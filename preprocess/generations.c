@@ -16,7 +16,11 @@ enum { REST = 50 };
 /* A disk takes as long for a flush as it has been given bytes since the last one, and nothing else
  * meanwhile. So it is flushed often: no commit waits long, and least of all the last one, when
  * there is nothing else left to be done. */
-#define FLUSH_SECONDS 0.04
+#define FLUSH_SECONDS 0.02
+
+/* While a disk is flushed, whoever gives it more waits. So those who make nodes only fill the page
+ * cache, and what is there is given to the disk by this thread. */
+#define START_SECONDS 0.005
 
 struct prep_generations {
     mospt_writer *writer;
@@ -60,13 +64,16 @@ static double now(void)
 /* Returns false where that is to end for good, by a failure or because the build has ended. */
 static bool flush_until(prep_generations *g, double when)
 {
-    for (;;) {
-        double next = now() + FLUSH_SECONDS;
+    for (double flushed = now(); !g->failed;) {
+        double next = now() + START_SECONDS;
         if (!wait_until(g, next < when ? next : when)) return false;
         if (now() >= when) return true;
+        mospt_writer_start_flush(g->writer);
+        if (now() < flushed + FLUSH_SECONDS) continue;
         g->failed = !mospt_writer_flush(g->writer, &g->err);
-        if (g->failed) return false;
+        flushed = now();
     }
+    return false;
 }
 
 static void *run(void *context)
