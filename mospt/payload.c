@@ -56,6 +56,70 @@ static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_
 #undef COPY
 }
 
+/* Bytes of records that are turned into columns together. */
+enum { WINDOW = 16 };
+typedef uint8_t window __attribute__((vector_size(WINDOW)));
+
+/* One of four steps that turn rows into columns: rows that are eight apart are put into each other.
+ */
+static inline void interleave(const window *from, window *to)
+{
+    for (int i = 0; i < WINDOW / 2; i++) {
+        to[2 * i] = __builtin_shufflevector(from[i], from[i + 8], 0, 16, 1, 17, 2, 18, 3, 19, 4, 20,
+                                            5, 21, 6, 22, 7, 23);
+        to[2 * i + 1] = __builtin_shufflevector(from[i], from[i + 8], 8, 24, 9, 25, 10, 26, 11, 27,
+                                                12, 28, 13, 29, 14, 30, 15, 31);
+    }
+}
+
+/* from     [count] records, at most BLOCK
+ * columns  out, of WINDOW bytes of each from `offset` on */
+static void turn(const uint8_t *const *from, size_t offset, uint32_t count,
+                 uint8_t columns[WINDOW][BLOCK])
+{
+    window a[WINDOW], b[WINDOW];
+    for (uint32_t start = 0; start < count; start += WINDOW) {
+        for (uint32_t i = 0; i < WINDOW; i++) /* what is behind the last one does not matter */
+            memcpy(&a[i], from[start + i < count ? start + i : start] + offset, WINDOW);
+        interleave(a, b), interleave(b, a), interleave(a, b), interleave(b, a);
+        for (uint32_t i = 0; i < WINDOW; i++)
+            memcpy(columns[i] + start, &a[i], WINDOW);
+    }
+}
+
+static void join_columns(uint8_t *restrict to, const uint8_t *restrict first,
+                         const uint8_t *restrict second, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++)
+        to[2 * i] = first[i], to[2 * i + 1] = second[i];
+}
+
+/* The planes of a block of points. Of attributes of one or two bytes, of which records have many, a
+ * byte at a time would be most of the work: these are taken from columns.
+ * planes   of all `count` points; out: those from `start` on
+ * from     [n] records, at most BLOCK */
+static void pack_planes(const mospt_schema *schema, uint8_t *planes, uint32_t count, uint32_t start,
+                        const uint8_t *const *from, uint32_t n)
+{
+    uint8_t columns[WINDOW][BLOCK];
+    size_t stride = mospt_record_size(schema), begin = stride; /* of the columns; none yet */
+    for (uint32_t k = 0; k < schema->count; k++) {
+        const mospt_attribute *a = &schema->at[k];
+        size_t size = mospt_attribute_size(a), offset = sizeof(mospt_vertex) + a->offset;
+        uint8_t *to = planes + (size_t)count * a->offset + start * size;
+        if (size > 2) {
+            gather(to, from, offset, size, n);
+            continue;
+        }
+        if (offset < begin || offset + size > begin + WINDOW) {
+            begin = offset + WINDOW <= stride ? offset : stride - WINDOW;
+            turn(from, begin, n, columns);
+        }
+        if (size == 1) memcpy(to, columns[offset - begin], n);
+        else join_columns(to, columns[offset - begin], columns[offset - begin + 1], n);
+    }
+}
+
 /* Of points [start, start + n) of a payload; at most BLOCK. */
 static uint64_t hash_block(const mospt_schema *schema, const uint8_t *vertices,
                            const uint8_t *planes, uint32_t count, uint32_t start, uint32_t n)
@@ -103,12 +167,7 @@ uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *rec
         }
         points_hash += hash_records(from, records->stride, n);
         gather(out + start * sizeof(mospt_vertex), from, 0, sizeof(mospt_vertex), n);
-        for (uint32_t k = 0; k < schema->count; k++) {
-            const mospt_attribute *a = &schema->at[k];
-            size_t size = mospt_attribute_size(a);
-            gather(planes + (size_t)count * a->offset + start * size, from,
-                   sizeof(mospt_vertex) + a->offset, size, n);
-        }
+        pack_planes(schema, planes, count, start, from, n);
     }
     node->count = count;
     node->codec = MOSPT_CODEC_RAW;

@@ -75,6 +75,22 @@ static void planes_hold_what_records_held(void **state)
     }
 }
 
+/* Of which many are taken out of the records at a time. */
+static void attributes_of_a_byte_or_two_are_packed(void **state)
+{
+    static const uint32_t counts[] = {1, 15, 16, 17, 256, 300};
+    mospt_schema s = {0};
+    mospt_err err = {0};
+    char name[16];
+    (void)state;
+    for (int i = 0; i < 40; i++) {
+        snprintf(name, sizeof name, "a%d", i);
+        CORE_NEED(mospt_schema_add(&s, name, i % 16 == 15 ? MOSPT_U16 : MOSPT_I8, 1, &err));
+        for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++)
+            check(&s, 50, counts[k]);
+    }
+}
+
 static void the_widest_rows_are_packed(void **state)
 {
     mospt_schema s = {0};
@@ -114,6 +130,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_hold_what_records_held),
+        cmocka_unit_test(attributes_of_a_byte_or_two_are_packed),
         cmocka_unit_test(the_widest_rows_are_packed),
         cmocka_unit_test(the_sum_of_hashes_does_not_depend_on_the_order_but_on_every_byte),
     };
