@@ -1,5 +1,6 @@
 #include "preprocess/las.h"
 
+#include "mospt/wide.h"
 #include "preprocess/bytes.h"
 
 #include <stdio.h>
@@ -11,7 +12,7 @@
 #endif
 
 /* Formats below 6 have these first: intensity, and those of add_standard_old(). */
-enum { HEAD_AT = 12, OLD_HEAD_FIELDS = 8 };
+enum { INTENSITY_AT = 12, HEAD_AT = INTENSITY_AT, OLD_HEAD_FIELDS = 8 };
 
 enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 
@@ -195,7 +196,7 @@ static void decode_xyz(const prep_las_layout *l, const uint8_t *p, uint32_t coun
 
 static uint8_t intensity_of(const prep_las_layout *l, const uint8_t *record)
 {
-    return l->has_intensity ? prep_tone_apply(&l->tone, prep_le16(record + 12)) : 255;
+    return l->has_intensity ? prep_tone_apply(&l->tone, prep_le16(record + INTENSITY_AT)) : 255;
 }
 
 static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
@@ -206,16 +207,36 @@ static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t 
         memset(out, intensity_of(l, p), 4);
 }
 
+/* Colours of 16 bits, channel by channel, and intensity as they are shown: four bytes, the first of
+ * which is the lowest. */
+MOSPT_WIDE static void show_block(uint16_t rgb[3][BLOCK], const uint8_t *intensity, uint32_t count,
+                                  uint32_t *shown)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t r = prep_tone_from_16(rgb[0][i]), g = prep_tone_from_16(rgb[1][i]);
+        uint32_t b = prep_tone_from_16(rgb[2][i]), a = intensity[i];
+        shown[i] = r | g << 8 | b << 16 | a << 24;
+    }
+}
+
+/* At most BLOCK points. */
 static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
                         size_t out_stride)
 {
-    size_t stride = l->record_length, at = l->rgb_at;
-    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
-        uint8_t rgbi[4] = {prep_tone_from_16(prep_le16(p + at)),
-                           prep_tone_from_16(prep_le16(p + at + 2)),
-                           prep_tone_from_16(prep_le16(p + at + 4)), intensity_of(l, p)};
-        memcpy(out, rgbi, sizeof rgbi);
+    uint16_t rgb[3][BLOCK], raw[BLOCK];
+    uint8_t intensity[BLOCK];
+    uint32_t shown[BLOCK];
+    const uint8_t *colour = p + l->rgb_at;
+    for (uint32_t i = 0; i < count; i++, p += l->record_length, colour += l->record_length) {
+        raw[i] = prep_le16(p + INTENSITY_AT);
+        for (int c = 0; c < 3; c++)
+            rgb[c][i] = prep_le16(colour + 2 * c);
     }
+    if (l->has_intensity) prep_tone_apply_16(&l->tone, raw, count, intensity);
+    else memset(intensity, UINT8_MAX, count);
+    show_block(rgb, intensity, count, shown);
+    for (uint32_t i = 0; i < count; i++, out += out_stride)
+        prep_le32_put(out, shown[i]);
 }
 
 static uint8_t at_most_255(uint16_t v)

@@ -1,5 +1,7 @@
 #include "preprocess/tone.h"
 
+#include "mospt/wide.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -56,4 +58,29 @@ prep_tone prep_tone_make(double *values, size_t count)
     double median = (values[n / 2] - low) / (high - low), power = POWER_MIN;
     if (median > 0) power = median < MEDIAN_SHOWN ? log(MEDIAN_SHOWN) / log(median) : 1;
     return make_curve(low, high, power > POWER_MIN ? power : POWER_MIN);
+}
+
+enum { BLOCK = 256 };
+
+/* Places on the curve, so that the vector unit has only numbers to deal with. */
+MOSPT_WIDE static void find_places(const prep_tone *tone, const uint16_t *values, uint32_t count,
+                                   int32_t *places)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        double place = (values[i] - tone->low) * tone->scale + 0.5;
+        place = place > 0 ? place : 0;
+        places[i] = (int32_t)(place < PREP_TONE_STEPS - 1 ? place : PREP_TONE_STEPS - 1);
+    }
+}
+
+void prep_tone_apply_16(const prep_tone *tone, const uint16_t *values, uint32_t count,
+                        uint8_t *shown)
+{
+    int32_t places[BLOCK];
+    for (uint32_t n; count > 0; values += n, shown += n, count -= n) {
+        n = count < BLOCK ? count : BLOCK;
+        find_places(tone, values, n, places);
+        for (uint32_t i = 0; i < n; i++)
+            shown[i] = tone->curve[places[i]];
+    }
 }

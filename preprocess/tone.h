@@ -33,6 +33,10 @@ static inline uint8_t prep_tone_apply(const prep_tone *tone, double value)
     return tone->curve[place > 0 ? (int)(place + 0.5) : 0]; /* NaN is the darkest */
 }
 
+/* The same for many whole numbers. */
+void prep_tone_apply_16(const prep_tone *tone, const uint16_t *values, uint32_t count,
+                        uint8_t *shown);
+
 /* Colours are shown as they are: only brought to 8 bits. */
 typedef struct {
     double low, scale; /* shown = (value - low) * scale, rounded and clamped */

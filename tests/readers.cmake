@@ -13,7 +13,8 @@ foreach(name
     test_ply
     test_real_scans
     test_scan_memory
-    test_text)
+    test_text
+    test_tone)
     add_executable(${name} ${name}.c)
     target_link_libraries(${name} PRIVATE readers_fixture)
     add_test(NAME ${name} COMMAND ${name})
