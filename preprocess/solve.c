@@ -516,7 +516,7 @@ bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t
 }
 
 /* Records that are fetched before their turn, since they stand anywhere. */
-enum { AHEAD = 24 };
+enum { AHEAD = 64 };
 
 static size_t records_room(const prep_shape *shape, uint32_t count)
 {
