@@ -16,7 +16,7 @@ enum { REST = 50 };
 /* A disk takes as long for a flush as it has been given bytes since the last one, and nothing else
  * meanwhile. So it is flushed often: no commit waits long, and least of all the last one, when
  * there is nothing else left to be done. */
-#define FLUSH_SECONDS 0.02
+#define FLUSH_SECONDS 0.04
 
 /* While a disk is flushed, whoever gives it more waits. So those who make nodes only fill the page
  * cache, and what is there is given to the disk by this thread. */
