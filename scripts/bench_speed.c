@@ -223,6 +223,7 @@ bool bench_speed_measure(bench_render *b, mospt_err *err)
     if (!b->view->no_occlusion) print_flown("+ occlusion", &resident, n);
     print_flown("paging 1/10", &paging, n);
     if (!b->view->no_occlusion)
-        printf("occlusion: %.0f %% fewer points\n", 100 * (1 - resident.points / all.points));
+        printf("with occlusion %.1f %% of the points without it\n",
+               100 * resident.points / all.points);
     return true;
 }
