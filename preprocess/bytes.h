@@ -12,11 +12,6 @@ static inline uint32_t prep_le32(const uint8_t *p)
 {
     return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
 }
-static inline void prep_le32_put(uint8_t *p, uint32_t v)
-{
-    for (int i = 0; i < 4; i++)
-        p[i] = (uint8_t)(v >> 8 * i);
-}
 static inline uint64_t prep_le64(const uint8_t *p)
 {
     return (uint64_t)prep_le32(p) | (uint64_t)prep_le32(p + 4) << 32;
@@ -27,6 +22,21 @@ static inline double prep_le_f64(const uint8_t *p)
     double value;
     memcpy(&value, &bits, sizeof value);
     return value;
+}
+static inline void prep_put_le16(uint8_t *p, uint32_t v)
+{
+    p[0] = (uint8_t)v;
+    p[1] = (uint8_t)(v >> 8);
+}
+static inline void prep_put_le32(uint8_t *p, uint32_t v)
+{
+    prep_put_le16(p, v);
+    prep_put_le16(p + 2, v >> 16);
+}
+static inline void prep_put_le64(uint8_t *p, uint64_t v)
+{
+    prep_put_le32(p, (uint32_t)v);
+    prep_put_le32(p + 4, (uint32_t)(v >> 32));
 }
 static inline uint16_t prep_swap16(uint16_t v)
 {

@@ -236,7 +236,7 @@ static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t cou
     else memset(intensity, UINT8_MAX, count);
     show_block(rgb, intensity, count, shown);
     for (uint32_t i = 0; i < count; i++, out += out_stride)
-        prep_le32_put(out, shown[i]);
+        prep_put_le32(out, shown[i]);
 }
 
 static uint8_t at_most_255(uint16_t v)

@@ -71,13 +71,13 @@ void prep_laz_wave_read(prep_laz_stream *stream, prep_laz_arena *arena, prep_laz
         prep_laz_integer_read(&r, arena, &w->size, &w->size_context, prep_le32(packet + 9));
     uint32_t location = prep_laz_integer_read(&r, arena, &w->location, &w->location_context,
                                               prep_le32(packet + 13));
-    prep_laz_put64(packet + 1, offset);
-    prep_laz_put32(packet + 9, size);
-    prep_laz_put32(packet + 13, location);
+    prep_put_le64(packet + 1, offset);
+    prep_put_le32(packet + 9, size);
+    prep_put_le32(packet + 13, location);
     for (uint32_t a = 0; a < 3; a++) {
         uint8_t *p = packet + 17 + 4 * a;
-        prep_laz_put32(p,
-                       prep_laz_integer_read(&r, arena, &w->xyz, &w->xyz_context[a], prep_le32(p)));
+        prep_put_le32(p,
+                      prep_laz_integer_read(&r, arena, &w->xyz, &w->xyz_context[a], prep_le32(p)));
     }
     stream->range = r;
 }

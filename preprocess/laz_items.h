@@ -98,22 +98,6 @@ bool prep_laz_layers_measure(const prep_laz_format *format, prep_laz_source sour
  * chunk. byte     out, where it begins */
 const char *prep_laz_layers_damage(const prep_laz_layers *layers, uint64_t *byte);
 
-static inline void prep_laz_put16(uint8_t *p, uint32_t v)
-{
-    p[0] = (uint8_t)v;
-    p[1] = (uint8_t)(v >> 8);
-}
-static inline void prep_laz_put32(uint8_t *p, uint32_t v)
-{
-    prep_laz_put16(p, v);
-    prep_laz_put16(p + 2, v >> 16);
-}
-static inline void prep_laz_put64(uint8_t *p, uint64_t v)
-{
-    prep_laz_put32(p, (uint32_t)v);
-    prep_laz_put32(p + 4, (uint32_t)(v >> 32));
-}
-
 /* Whether another point can be read from the stream of which `r` is the decoder. */
 PREP_LAZ_INLINE bool prep_laz_ready(prep_laz_stream *stream, prep_laz_range *r)
 {

@@ -146,8 +146,8 @@ static size_t read_first_layer(prep_laz_layers *s, uint8_t *record, size_t count
         uint32_t level = c->returns > c->number ? c->returns - c->number : c->number - c->returns;
         n->level = (uint8_t)(level < 7 ? level : 7);
         read_xy(&r, &s->arena, c, n);
-        prep_laz_put32(record, c->x);
-        prep_laz_put32(record + 4, c->y);
+        prep_put_le32(record, c->x);
+        prep_put_le32(record + 4, c->y);
         record[14] = (uint8_t)(c->number | c->returns << 4);
     }
     l->stream.range = r;
@@ -172,7 +172,7 @@ static size_t read_z(prep_laz_layers *s, uint8_t *record, size_t count)
             c->z = c->heights[n->level] = prep_laz_integer_read(
                 &r, &s->arena, &c->z_integer, &c->z_context[n->z_context], c->heights[n->level]);
         else if (l->is_broken) break;
-        prep_laz_put32(record + 8, c->z);
+        prep_put_le32(record + 8, c->z);
     }
     l->stream.range = r;
     return without_last_if_beyond(l, was_live, i);
@@ -229,7 +229,7 @@ static void read_intensity(prep_laz_layers *s, uint8_t *record, size_t count)
                                                     &c->intensity_context[n->ends], *last);
             c->intensity = *last;
         }
-        prep_laz_put16(record + 12, c->intensity);
+        prep_put_le16(record + 12, c->intensity);
     }
     l->stream.range = r;
 }
@@ -245,7 +245,7 @@ static void read_angle(prep_laz_layers *s, uint8_t *record, size_t count)
         if (n->has_new_angle && layer_ready(l, &r))
             c->angle = (uint16_t)prep_laz_integer_read(
                 &r, &s->arena, &c->angle_integer, &c->angle_context[n->has_new_time], c->angle);
-        prep_laz_put16(record + 18, c->angle);
+        prep_put_le16(record + 18, c->angle);
     }
     l->stream.range = r;
 }
@@ -277,7 +277,7 @@ static void read_source(prep_laz_layers *s, uint8_t *record, size_t count)
         if (n->has_new_source && layer_ready(l, &r))
             c->source = (uint16_t)prep_laz_integer_read(&r, &s->arena, &c->source_integer,
                                                         &c->source_context, c->source);
-        prep_laz_put16(record + 20, c->source);
+        prep_put_le16(record + 20, c->source);
     }
     l->stream.range = r;
 }
@@ -294,7 +294,7 @@ static void read_gps(prep_laz_layers *s, uint8_t *record, size_t count)
             g->time[0] = from->time[from->current];
         }
         if (n->has_new_time && layer_ready(l, &r)) prep_laz_gps_read(&r, &s->arena, g, false);
-        prep_laz_put64(record + s->format.gps_at, g->time[g->current]);
+        prep_put_le64(record + s->format.gps_at, g->time[g->current]);
     }
     l->stream.range = r;
 }

@@ -286,15 +286,15 @@ PREP_LAZ_INLINE void read_extra(prep_laz_range *r, prep_laz_rows *s, uint8_t *la
 
 static inline void put_point(const point_state *p, uint8_t *record)
 {
-    prep_laz_put32(record, p->x);
-    prep_laz_put32(record + 4, p->y);
-    prep_laz_put32(record + 8, p->z);
-    prep_laz_put16(record + 12, p->intensity);
+    prep_put_le32(record, p->x);
+    prep_put_le32(record + 4, p->y);
+    prep_put_le32(record + 8, p->z);
+    prep_put_le16(record + 12, p->intensity);
     record[14] = p->returns;
     record[15] = p->classification;
     record[16] = p->angle;
     record[17] = p->user;
-    prep_laz_put16(record + 18, p->source);
+    prep_put_le16(record + 18, p->source);
 }
 
 /* The compiler makes one of these for each version. */
@@ -311,7 +311,7 @@ PREP_LAZ_INLINE size_t read_rows(prep_laz_rows *s, uint8_t *record, size_t count
         if (f.gps_at != 0) {
             if (is_old) read_old_gps(&r, arena, &s->gps);
             else prep_laz_gps_read(&r, arena, &s->gps, true);
-            prep_laz_put64(record + f.gps_at, s->gps.time[s->gps.current]);
+            prep_put_le64(record + f.gps_at, s->gps.time[s->gps.current]);
         }
         if (f.rgb_at != 0) {
             if (is_old) read_old_rgb(&r, arena, &s->rgb, s->last + f.rgb_at);
