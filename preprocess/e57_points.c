@@ -7,11 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* integer * scale + offset must round twice, as everyone else's does */
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF
-#endif
-
 static const char *const cartesian[3] = {"cartesianX", "cartesianY", "cartesianZ"};
 static const char *const spherical[3] = {"sphericalRange", "sphericalAzimuth",
                                          "sphericalElevation"};

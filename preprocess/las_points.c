@@ -7,10 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF /* X * scale + offset must round twice, as everyone else's does */
-#endif
-
 /* Formats below 6 have these first: intensity, and those of add_standard_old(). */
 enum { INTENSITY_AT = 12, HEAD_AT = INTENSITY_AT, OLD_HEAD_FIELDS = 8 };
 
