@@ -18,6 +18,11 @@
 
 /* Levels from here on share the last file: only piles of identical positions get so deep. */
 enum { FILES_MAX = MOSPT_SINK_FILES_MAX, PIECE_SIZE = 1 << 18 };
+
+/* A disk that is flushed takes nothing else. Past the page cache, writers wait for that: there it
+ * is flushed when so much was written. */
+enum { FLUSH_SIZE_PAST_CACHE = 16 << 20 };
+
 #define PAYLOAD_NAME "points-%02u.bin"
 #define UNFINISHED_NAME "unfinished-%06" PRIu64 ".bin"
 
@@ -262,7 +267,8 @@ static bool flush_file(mospt_writer *w, uint32_t file, mospt_err *err)
                          PAYLOAD_NAME " cannot be flushed to the disk", file);
 }
 
-void mospt_writer_start_flush(mospt_writer *w)
+/* Lets the disk begin with all that waits for it. */
+static void start_flush(mospt_writer *w)
 {
     for (uint32_t i = 0; w->sink == NULL && i < FILES_MAX; i++) {
         pthread_mutex_lock(&w->lock);
@@ -276,12 +282,13 @@ void mospt_writer_start_flush(mospt_writer *w)
 bool mospt_writer_flush(mospt_writer *w, mospt_err *err)
 {
     uint32_t most = 0;
+    start_flush(w);
     pthread_mutex_lock(&w->lock);
     for (uint32_t i = 1; i < w->file_count; i++)
         if (w->unflushed[i] > w->unflushed[most]) most = i;
     uint64_t bytes = w->unflushed[most];
     pthread_mutex_unlock(&w->lock);
-    return bytes == 0 || flush_file(w, most, err);
+    return bytes < (w->sink != NULL ? FLUSH_SIZE_PAST_CACHE : 1) || flush_file(w, most, err);
 }
 
 static bool hash_range(const mospt_writer *w, const mospt_node *node, uint64_t skip, uint64_t size,

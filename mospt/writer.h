@@ -56,12 +56,9 @@ bool mospt_writer_hash(mospt_writer *writer, mospt_node *node, mospt_err *err);
 void mospt_writer_complete(mospt_writer *writer, uint32_t index, const mospt_node *node,
                            uint64_t points_hash);
 
-/* Asks the disk to take what was written, and does not wait for it. Called often, by a thread that
- * has time, it keeps those who write from waiting for the disk. threads  as mospt_writer_flush() */
-void mospt_writer_start_flush(mospt_writer *writer);
-
-/* Flushes some of what was written, that which is most: called now and then, it leaves little for
- * the commits. threads  one at a time, as for mospt_writer_commit_part() */
+/* Gives the disk all that waits in the page cache, and waits until it has that file which most was
+ * written to. Called again and again, it leaves little for the commits.
+ * threads  one at a time, as for mospt_writer_commit_part() */
 bool mospt_writer_flush(mospt_writer *writer, mospt_err *err);
 
 /* Bytes of payload that have their place, and nodes. */

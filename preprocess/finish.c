@@ -11,6 +11,8 @@
 typedef struct {
     const prep_finish_part *part;
     uint64_t count;
+    const prep_solving *solving; /* borrowed: it is a piece of that; NULL: it is all of the part */
+    uint32_t piece;
     uint32_t kept;  /* its node of what an interrupted build has left; MOSPT_NO_NODE: none */
     bool is_solved; /* under the lock, like the counts below */
     bool on_heap;   /* its memory is not of the arena, for which it is too large */
@@ -104,7 +106,7 @@ static size_t records_size(const prep_pass_env *env, const item *i)
 
 static bool take_memory(const prep_pass_env *env, item *i)
 {
-    if (i->kept != MOSPT_NO_NODE) return true;
+    if (i->kept != MOSPT_NO_NODE || i->solving != NULL) return true;
     size_t size = prep_solve_work_size((uint32_t)i->count) + records_size(env, i);
     i->memory = i->on_heap ? malloc(size) : prep_arena_take(env->arena, size);
     return i->memory != NULL;
@@ -145,11 +147,11 @@ static bool collect_records(const prep_pass_env *env, item *i, uint8_t *to, mosp
     return true;
 }
 
-/* shared   all threads solve it together */
-static bool solve_item(const prep_pass_env *env, item *i, bool shared, mospt_err *err)
+static bool solve_item(const prep_pass_env *env, item *i, mospt_err *err)
 {
     const prep_finish_part *part = i->part;
     uint32_t count = (uint32_t)i->count;
+    if (i->solving != NULL) return prep_solving_piece(i->solving, i->piece, &i->made, err);
     if (!check_kept(env, i, err)) return false;
     if (i->kept != MOSPT_NO_NODE)
         return prep_resume_list(env->resume, i->kept, !part->is_node, &i->made, err);
@@ -158,9 +160,6 @@ static bool solve_item(const prep_pass_env *env, item *i, bool shared, mospt_err
     if (part->is_node)
         return prep_solve_node(env->shape, part->corner, part->level, part->child_mask, &i->records,
                                count, i->memory, &i->made, err);
-    if (shared)
-        return prep_solve_shared(env->shape, env->workers, part->corner, part->level, &i->records,
-                                 count, i->memory, &i->made, err);
     return prep_solve(env->shape, part->corner, part->level, &i->records, count, i->memory,
                       &i->made, err);
 }
@@ -275,7 +274,7 @@ static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
         *ok = *ok && settle_node(l, i, n, hash, err);
     } else if (solving != NULL) {
         pthread_mutex_unlock(&l->lock);
-        *ok = solve_item(l->env, solving, false, err);
+        *ok = solve_item(l->env, solving, err);
         pthread_mutex_lock(&l->lock);
         solving->is_solved = *ok;
         *ok = *ok && place_solved(l, err);
@@ -309,37 +308,68 @@ static void work_on_line(void *context, uint32_t thread)
     drop_buffer(&b);
 }
 
-/* What all threads solve together comes alone. */
-static bool solve_shared(line *l)
+/* Takes over the items. */
+static bool run_line(const prep_pass_env *env, item *items, uint32_t item_count, mospt_err *err)
 {
-    item *i = next_to_solve(l);
-    i->is_solved = solve_item(l->env, i, true, &l->err);
-    return i->is_solved && place_solved(l, &l->err);
-}
-
-/* shared   solve the one part with all threads */
-static bool finish_in_memory(const prep_pass_env *env, const prep_finish_part *parts,
-                             uint32_t part_count, bool shared, mospt_err *err)
-{
-    line l = {.env = env, .item_count = part_count};
-    if (part_count == 0) return true;
-    l.items = calloc(part_count, sizeof *l.items);
-    if (l.items == NULL) return mospt_err_nomem(err, part_count * sizeof *l.items);
-    for (uint32_t i = 0; i < part_count; i++)
-        l.items[i] = (item){
-            .part = &parts[i], .count = count_of(&parts[i]), .kept = find_kept(env, &parts[i])};
+    line l = {.env = env, .items = items, .item_count = item_count};
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
-    l.failed = shared && !solve_shared(&l);
-    if (!l.failed)
-        prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
+    prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
     pthread_cond_destroy(&l.change);
     pthread_mutex_destroy(&l.lock);
-    for (uint32_t i = 0; i < part_count; i++)
-        fini_item(env, &l.items[i]);
-    free(l.items);
+    for (uint32_t i = 0; i < item_count; i++)
+        fini_item(env, &items[i]);
+    free(items);
     if (l.failed && err != NULL) *err = l.err;
     return !l.failed;
+}
+
+static bool finish_in_memory(const prep_pass_env *env, const prep_finish_part *parts,
+                             uint32_t part_count, mospt_err *err)
+{
+    if (part_count == 0) return true;
+    item *items = calloc(part_count, sizeof *items);
+    if (items == NULL) return mospt_err_nomem(err, part_count * sizeof *items);
+    for (uint32_t i = 0; i < part_count; i++)
+        items[i] = (item){
+            .part = &parts[i], .count = count_of(&parts[i]), .kept = find_kept(env, &parts[i])};
+    return run_line(env, items, part_count, err);
+}
+
+static bool finish_pieces(const prep_pass_env *env, const item *whole, const prep_solving *solving,
+                          mospt_err *err)
+{
+    uint32_t count = prep_solving_pieces(solving);
+    item *items = calloc(count, sizeof *items);
+    if (items == NULL) return mospt_err_nomem(err, count * sizeof *items);
+    for (uint32_t i = 0; i < count; i++)
+        items[i] = (item){.part = whole->part,
+                          .kept = MOSPT_NO_NODE,
+                          .solving = solving,
+                          .piece = i,
+                          .records = whole->records};
+    return run_line(env, items, count, err);
+}
+
+/* All threads begin with it together. It comes alone, and piece by piece. */
+static bool finish_shared(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
+{
+    item i = {.part = part, .count = count_of(part), .kept = MOSPT_NO_NODE};
+    uint32_t count = (uint32_t)i.count;
+    prep_solving *solving = NULL;
+    if (!take_memory(env, &i)) {
+        /* Better too much memory than none. */
+        i.on_heap = true;
+        if (!take_memory(env, &i)) return mospt_err_nomem(err, (size_t)i.count);
+    }
+    bool ok = check_kept(env, &i, err) &&
+              collect_records(env, &i, (uint8_t *)i.memory + prep_solve_work_size(count), err) &&
+              prep_solving_begin(env->shape, env->workers, part->corner, part->level, &i.records,
+                                 count, i.memory, &solving, err) &&
+              finish_pieces(env, &i, solving, err);
+    prep_solving_end(solving);
+    fini_item(env, &i);
+    return ok;
 }
 
 /* What comes of a large part is needed before what waits behind it: as much of that goes to the
@@ -380,13 +410,13 @@ bool prep_finish(const prep_pass_env *env, const prep_finish_list *list, mospt_e
                         !(part->is_node && env->shape->inner_depth == MOSPT_DEPTH_MIN),
              is_shared = !part->is_node && count >= SHARED_MIN;
         if ((!is_large && !is_shared) || find_kept(env, part) != MOSPT_NO_NODE) continue;
-        if (!finish_in_memory(env, list->parts + begin, i - begin, false, err)) return false;
+        if (!finish_in_memory(env, list->parts + begin, i - begin, err)) return false;
         if (is_large && (!make_room(env, list, i, err) || !finish_large(env, part, err)))
             return false;
-        if (!is_large && !finish_in_memory(env, part, 1, true, err)) return false;
+        if (!is_large && !finish_shared(env, part, err)) return false;
         begin = i + 1;
     }
-    return finish_in_memory(env, list->parts + begin, list->part_count - begin, false, err);
+    return finish_in_memory(env, list->parts + begin, list->part_count - begin, err);
 }
 
 /* Makes one node of a pile and writes it.

@@ -14,13 +14,10 @@
 enum { REST = 50 };
 
 /* A disk takes as long for a flush as it has been given bytes since the last one, and nothing else
- * meanwhile. So it is flushed often: no commit waits long, and least of all the last one, when
- * there is nothing else left to be done. */
-#define FLUSH_SECONDS 0.04
-
-/* While a disk is flushed, whoever gives it more waits. So those who make nodes only fill the page
- * cache, and what is there is given to the disk by this thread. */
-#define START_SECONDS 0.005
+ * meanwhile. So it is given what is there, and flushed, all the time: no commit waits long, and
+ * least of all the last one, when there is nothing else left to be done. Those who make nodes only
+ * fill the page cache, since whoever gives a disk more while it is flushed waits. */
+#define PAUSE_SECONDS 0.001
 
 struct prep_generations {
     mospt_writer *writer;
@@ -64,14 +61,11 @@ static double now(void)
 /* Returns false where that is to end for good, by a failure or because the build has ended. */
 static bool flush_until(prep_generations *g, double when)
 {
-    for (double flushed = now(); !g->failed;) {
-        double next = now() + START_SECONDS;
+    while (!g->failed) {
+        double next = now() + PAUSE_SECONDS;
         if (!wait_until(g, next < when ? next : when)) return false;
         if (now() >= when) return true;
-        mospt_writer_start_flush(g->writer);
-        if (now() < flushed + FLUSH_SECONDS) continue;
         g->failed = !mospt_writer_flush(g->writer, &g->err);
-        flushed = now();
     }
     return false;
 }

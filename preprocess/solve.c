@@ -8,7 +8,7 @@
 enum {
     OCTANTS = 8,
     PIECES_MAX = OCTANTS * OCTANTS,
-    SHARED_MIN = 1 << 18, /* points that all threads divide together */
+    SHARED_MIN = 1 << 19, /* points that all threads divide together */
     RUN_BITS = 8,
     RUN = 1 << RUN_BITS, /* points that are divided at a time */
 };
@@ -98,15 +98,15 @@ static bool keep(const solver *s, const part *p, uint8_t child_mask, uint32_t ce
         return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
                              "more than %d levels: too many points at one position", UINT16_MAX);
     if (!reserve(made, err)) return false;
-    made->nodes[made->node_count++] = (prep_solved){
-        .keys = keys,
-        .first = p->first,
-        .cell_shift = cell_shift,
-        .node = {.corner = {p->corner[0], p->corner[1], p->corner[2]},
-                 .level = (uint16_t)p->level,
-                 .child_mask = child_mask,
-                 .count = count,
-                 .payload_size = (uint64_t)count * mospt_record_size(s->shape->schema)}};
+    made->nodes[made->node_count++] =
+        (prep_solved){.keys = keys,
+                      .first = p->first,
+                      .cell_shift = cell_shift,
+                      .node = {.corner = {p->corner[0], p->corner[1], p->corner[2]},
+                               .level = (uint16_t)p->level,
+                               .child_mask = child_mask,
+                               .count = count,
+                               .payload_size = (uint64_t)count * mospt_record_size(s->shape->schema)}};
     return true;
 }
 
@@ -142,8 +142,7 @@ static uint32_t count_before(const division *d, uint32_t piece)
 }
 
 /* Points that find their finest cell taken. */
-MOSPT_WIDE static uint32_t count_rejected(const uint64_t *keys, uint32_t count,
-                                          uint32_t cell_shift)
+MOSPT_WIDE static uint32_t count_rejected(const uint64_t *keys, uint32_t count, uint32_t cell_shift)
 {
     uint64_t sum = 0;
     for (uint32_t i = 1; i < count; i++)
@@ -380,123 +379,106 @@ bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t leve
     return ok;
 }
 
-/* A part that one thread solves. */
+/* A piece of a subtree: a part that is left for one thread, or a node that is made already. */
 typedef struct {
     part p;
-    prep_subtree made;
-    mospt_err err;
-} task;
+    prep_solved node; /* of no points: the part is left */
+} piece;
 
-/* Parts that all threads divide together, and those that are left for one each. */
-typedef struct {
+struct prep_solving {
     solver s;
-    prep_workers *workers;
-    part *large; /* [large_count], owned */
-    task *tasks; /* [task_count], owned */
-    uint32_t large_count, task_count;
-    prep_subtree made; /* of the large ones */
-} shared;
+    part *large;   /* [large_count], owned: what all threads divide together */
+    piece *pieces; /* [piece_count], owned */
+    uint32_t large_count, piece_count;
+};
 
-static bool append(shared *sh, const part *p, mospt_err *err)
+static bool add_piece(prep_solving *o, piece new, mospt_err *err)
 {
-    bool is_large = p->count >= SHARED_MIN && !is_pile(&sh->s, p) && !ends_above(&sh->s, p);
-    if (is_large) {
-        part *large = realloc(sh->large, (sh->large_count + 1) * sizeof *large);
-        if (large == NULL) return mospt_err_nomem(err, sizeof *large);
-        sh->large = large;
-        large[sh->large_count++] = *p;
-    } else {
-        task *tasks = realloc(sh->tasks, (sh->task_count + 1) * sizeof *tasks);
-        if (tasks == NULL) return mospt_err_nomem(err, sizeof *tasks);
-        sh->tasks = tasks;
-        tasks[sh->task_count++] = (task){.p = *p, .made.index_bits = sh->made.index_bits};
-    }
+    piece *pieces = realloc(o->pieces, (o->piece_count + 1) * sizeof *pieces);
+    if (pieces == NULL) return mospt_err_nomem(err, (o->piece_count + 1) * sizeof *pieces);
+    o->pieces = pieces;
+    pieces[o->piece_count++] = new;
     return true;
 }
 
-static bool divide_large(shared *sh, mospt_err *err)
+static bool add_part(prep_solving *o, const part *p, mospt_err *err)
+{
+    bool is_large = p->count >= SHARED_MIN && !is_pile(&o->s, p) && !ends_above(&o->s, p);
+    if (!is_large) return add_piece(o, (piece){.p = *p}, err);
+    part *large = realloc(o->large, (o->large_count + 1) * sizeof *large);
+    if (large == NULL) return mospt_err_nomem(err, (o->large_count + 1) * sizeof *large);
+    o->large = large;
+    large[o->large_count++] = *p;
+    return true;
+}
+
+static bool divide_large(prep_solving *o, prep_workers *workers, mospt_err *err)
 {
     division d;
-    part p = sh->large[--sh->large_count], below[OCTANTS];
+    part p = o->large[--o->large_count], below[OCTANTS];
+    prep_subtree made = {0};
     uint32_t count;
-    begin_division(&sh->s, &p, sh->s.shape->inner_depth > 1 ? 2 : 1, &d);
-    prep_workers_run(sh->workers, d.pieces, count_piece, &d);
+    begin_division(&o->s, &p, o->s.shape->inner_depth > 1 ? 2 : 1, &d);
+    prep_workers_run(workers, d.pieces, count_piece, &d);
     place_pieces(&d);
-    prep_workers_run(sh->workers, d.pieces, move_piece, &d);
-    bool ok = settle(&d, below, &count, &sh->made, err);
+    prep_workers_run(workers, d.pieces, move_piece, &d);
+    bool ok = settle(&d, below, &count, &made, err) &&
+              add_piece(o, (piece){.p = p, .node = made.nodes[0]}, err);
     for (uint32_t i = 0; ok && i < count; i++)
-        ok = append(sh, &below[i], err);
+        ok = add_part(o, &below[i], err);
+    prep_subtree_fini(&made);
     return ok;
-}
-
-/* Job. */
-static void solve_task(void *context, uint32_t index)
-{
-    shared *sh = context;
-    task *t = &sh->tasks[index];
-    solve_part(&sh->s, t->p, &t->made, &t->err);
-}
-
-/* So that the last ones to end are short. */
-static int largest_first(const void *a, const void *b)
-{
-    const task *x = a, *y = b;
-    return (x->p.count < y->p.count) - (x->p.count > y->p.count);
 }
 
 static int in_order(const void *a, const void *b)
 {
-    const prep_solved *x = a, *y = b;
-    return (x->first > y->first) - (x->first < y->first);
+    const piece *x = a, *y = b;
+    return (x->p.first > y->p.first) - (x->p.first < y->p.first);
 }
 
-static bool gather_tasks(shared *sh, mospt_err *err)
+bool prep_solving_begin(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
+                        uint32_t level, const mospt_records *records, uint32_t count, void *work,
+                        prep_solving **out, mospt_err *err)
 {
-    uint32_t count = sh->made.node_count;
-    for (uint32_t i = 0; i < sh->task_count; i++) {
-        if (sh->tasks[i].err.code != MOSPT_OK) {
-            if (err != NULL) *err = sh->tasks[i].err;
-            return false;
-        }
-        count += sh->tasks[i].made.node_count;
-    }
-    prep_solved *nodes = realloc(sh->made.nodes, count * sizeof *nodes);
-    if (nodes == NULL) return mospt_err_nomem(err, count * sizeof *nodes);
-    sh->made.nodes = nodes;
-    sh->made.node_capacity = count;
-    for (uint32_t i = 0; i < sh->task_count; i++) {
-        const prep_subtree *made = &sh->tasks[i].made;
-        memcpy(nodes + sh->made.node_count, made->nodes, made->node_count * sizeof *nodes);
-        sh->made.node_count += made->node_count;
-    }
-    qsort(nodes, count, sizeof *nodes, in_order);
-    return true;
-}
-
-bool prep_solve_shared(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
-                       uint32_t level, const mospt_records *records, uint32_t count, void *work,
-                       prep_subtree *out, mospt_err *err)
-{
-    shared sh = {.workers = workers};
-    solver_init(&sh.s, shape, records, count, work);
-    sh.made.index_bits = sh.s.sorter.index_bits;
+    prep_solving *o = calloc(1, sizeof *o);
+    if (o == NULL) return mospt_err_nomem(err, sizeof *o);
+    solver_init(&o->s, shape, records, count, work);
     part p = whole(corner, level, count);
-    bool ok = prep_sort_all_shared(&sh.s.sorter, workers, level, sh.s.keys[0], sh.s.keys[1], count,
+    bool ok = prep_sort_all_shared(&o->s.sorter, workers, level, o->s.keys[0], o->s.keys[1], count,
                                    err) &&
-              append(&sh, &p, err);
-    while (ok && sh.large_count > 0)
-        ok = divide_large(&sh, err);
+              add_part(o, &p, err);
+    while (ok && o->large_count > 0)
+        ok = divide_large(o, workers, err);
     if (ok) {
-        if (sh.task_count > 0) qsort(sh.tasks, sh.task_count, sizeof *sh.tasks, largest_first);
-        prep_workers_run(workers, sh.task_count, solve_task, &sh);
-        ok = gather_tasks(&sh, err);
+        qsort(o->pieces, o->piece_count, sizeof *o->pieces, in_order);
+        *out = o;
+    } else {
+        prep_solving_end(o);
     }
-    for (uint32_t i = 0; i < sh.task_count; i++)
-        prep_subtree_fini(&sh.tasks[i].made);
-    free(sh.large), free(sh.tasks);
-    if (ok) *out = sh.made;
-    else prep_subtree_fini(&sh.made);
     return ok;
+}
+
+uint32_t prep_solving_pieces(const prep_solving *o)
+{
+    return o->piece_count;
+}
+
+bool prep_solving_piece(const prep_solving *o, uint32_t index, prep_subtree *out, mospt_err *err)
+{
+    const piece *a = &o->pieces[index];
+    prep_subtree made = {.index_bits = o->s.sorter.index_bits};
+    bool ok = a->node.node.count > 0 ? reserve(&made, err) : solve_part(&o->s, a->p, &made, err);
+    if (ok && a->node.node.count > 0) made.nodes[made.node_count++] = a->node;
+    if (ok) *out = made;
+    else prep_subtree_fini(&made);
+    return ok;
+}
+
+void prep_solving_end(prep_solving *o)
+{
+    if (o == NULL) return;
+    free(o->large), free(o->pieces);
+    free(o);
 }
 
 bool prep_solve_node(const prep_shape *shape, const uint32_t corner[3], uint32_t level,

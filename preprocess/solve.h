@@ -55,11 +55,23 @@ bool prep_solve(const prep_shape *shape, const uint32_t corner[3], uint32_t leve
                 const mospt_records *records, uint32_t count, void *work, prep_subtree *out,
                 mospt_err *err);
 
-/* The same by all workers: for many points.
+/* The same for many points, in two steps. All workers sort them, and divide them as long as they
+ * are many; what comes of that are pieces, which are solved by one thread each. The nodes of all
+ * pieces, one after another, are those of the subtree. */
+typedef struct prep_solving prep_solving;
+
+/* Parameters as of prep_solve().
+ * out      ended by prep_solving_end()
  * threads  that of the workers */
-bool prep_solve_shared(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
-                       uint32_t level, const mospt_records *records, uint32_t count, void *work,
-                       prep_subtree *out, mospt_err *err);
+bool prep_solving_begin(const prep_shape *shape, prep_workers *workers, const uint32_t corner[3],
+                        uint32_t level, const mospt_records *records, uint32_t count, void *work,
+                        prep_solving **out, mospt_err *err);
+uint32_t prep_solving_pieces(const prep_solving *solving);
+
+/* threads  any, each piece once */
+bool prep_solving_piece(const prep_solving *solving, uint32_t piece, prep_subtree *out,
+                        mospt_err *err);
+void prep_solving_end(prep_solving *solving);
 
 /* Makes one node of all the given points.
  * child_mask  octants that have a child; no two of the points in such an octant share a finest cell

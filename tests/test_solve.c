@@ -147,6 +147,29 @@ static void assert_same_division(const prep_subtree *a, const prep_subtree *b)
     }
 }
 
+/* Last piece first: any order is right. */
+static prep_subtree solve_pieces(const prep_solving *solving)
+{
+    uint32_t pieces = prep_solving_pieces(solving), count = 0;
+    prep_subtree all = {0}, *made = calloc(pieces, sizeof *made);
+    mospt_err err = {0};
+    assert_non_null(made);
+    for (uint32_t i = pieces; i-- > 0;) {
+        CORE_NEED(prep_solving_piece(solving, i, &made[i], &err));
+        count += made[i].node_count;
+    }
+    all.nodes = malloc(count * sizeof *all.nodes);
+    assert_non_null(all.nodes);
+    for (uint32_t i = 0; i < pieces; i++) {
+        all.index_bits = made[i].index_bits;
+        for (uint32_t n = 0; n < made[i].node_count; n++)
+            all.nodes[all.node_count++] = made[i].nodes[n];
+        prep_subtree_fini(&made[i]);
+    }
+    free(made);
+    return all;
+}
+
 static void assert_shared_like_alone(core_kind kind, uint32_t bits, uint32_t count, uint32_t depth)
 {
     core_site site;
@@ -156,17 +179,20 @@ static void assert_shared_like_alone(core_kind kind, uint32_t bits, uint32_t cou
     const mospt_records records = {
         .blocks = blocks, .stride = site.stride, .shift = MOSPT_RECORDS_ONE_BLOCK};
     void *work = malloc(prep_solve_work_size(count)), *other = malloc(prep_solve_work_size(count));
-    prep_subtree alone = {0}, shared = {0};
+    prep_subtree alone = {0};
+    prep_solving *solving = NULL;
     mospt_err err = {0};
     assert_true(work != NULL && other != NULL);
     CORE_NEED(prep_solve(&shape, site.grid.root, 0, &records, count, work, &alone, &err));
     for (uint32_t threads = 1; threads <= 5; threads += 2) {
         prep_workers *workers = NULL;
         CORE_NEED(prep_workers_create(threads, &workers, &err));
-        CORE_NEED(prep_solve_shared(&shape, workers, site.grid.root, 0, &records, count, other,
-                                    &shared, &err));
+        CORE_NEED(prep_solving_begin(&shape, workers, site.grid.root, 0, &records, count, other,
+                                     &solving, &err));
+        prep_subtree shared = solve_pieces(solving);
         assert_same_division(&alone, &shared);
         prep_subtree_fini(&shared);
+        prep_solving_end(solving);
         prep_workers_destroy(workers);
     }
     prep_subtree_fini(&alone);
