@@ -161,7 +161,7 @@ static void check_node(checker *c, uint32_t node)
     mospt_err err;
     bool whole = true;
     if (!mospt_dataset_read_vertices(d, node, v, &err)) report(c, &err), whole = false;
-    if (!mospt_dataset_read_attributes(d, node, planes, &err)) report(c, &err), whole = false;
+    if (!mospt_dataset_read_attributes(d, node, v, planes, &err)) report(c, &err), whole = false;
     if (!whole) return;
     for (uint32_t i = 0; i < n->count; i++) {
         const uint32_t g[3] = {v[i].x, v[i].y, v[i].z};

@@ -65,11 +65,11 @@ static bool open_payloads(mospt_dataset *d, mospt_err *err)
 
 static bool payloads_fit(const mospt_dataset *d, mospt_err *err)
 {
-    size_t record_size = mospt_record_size(&d->metadata.schema);
+    const mospt_schema *schema = &d->metadata.schema;
     for (uint32_t i = 0; i < d->hierarchy.count; i++) {
         const mospt_node *n = &d->hierarchy.nodes[i];
         bool fits = n->payload_file < d->metadata.file_count &&
-                    n->payload_size == (uint64_t)n->count * record_size &&
+                    n->payload_size == mospt_payload_size(schema, n->count) &&
                     n->payload_offset <= d->metadata.files[n->payload_file].size &&
                     n->payload_size <= d->metadata.files[n->payload_file].size - n->payload_offset;
         if (!fits)
@@ -161,11 +161,14 @@ bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mo
                      dataset->hierarchy.nodes[node].vertices_hash, "vertices", err);
 }
 
-bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
-                                   mospt_err *err)
+bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node,
+                                   const mospt_vertex *vertices, uint8_t *out, mospt_err *err)
 {
     const mospt_node *n = &dataset->hierarchy.nodes[node];
-    return read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,
-                     (size_t)n->count * dataset->metadata.schema.row_size, n->attributes_hash,
-                     "attributes", err);
+    const mospt_schema *schema = &dataset->metadata.schema;
+    if (!read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,
+                   mospt_dataset_planes_size(dataset, node), n->attributes_hash, "attributes", err))
+        return false;
+    mospt_payload_complete(schema, vertices, n->count, out);
+    return true;
 }

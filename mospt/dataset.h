@@ -8,6 +8,9 @@
 #include "mospt/point.h"
 #include "mospt/schema.h"
 
+/* Of the format, as docs/format.md has it; what has the one before is read, too. */
+enum { MOSPT_DATASET_VERSION = 3 };
+
 typedef struct {
     char *name;           /* owned, relative to the folder that was built from */
     char *scan;           /* owned, name of the scan inside a file that holds several, else "" */
@@ -99,8 +102,17 @@ static inline size_t mospt_dataset_vertices_size(const mospt_dataset *dataset, u
 bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mospt_vertex *out,
                                  mospt_err *err);
 
-/* Reads all attribute planes of one node, as they are stored, and checks their hash.
+/* Bytes of the attribute planes of a node, as they are stored. */
+static inline size_t mospt_dataset_planes_size(const mospt_dataset *dataset, uint32_t node)
+{
+    return (size_t)dataset->hierarchy.nodes[node].payload_size -
+           mospt_dataset_vertices_size(dataset, node);
+}
+
+/* Reads all attributes of one node and checks the hash of the planes.
+ * vertices [nodes[node].count], as they were read: some attributes are the colour
  * out      [nodes[node].count * schema.row_size] bytes: plane after plane, in the order of the
- * schema threads  any */
-bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
-                                   mospt_err *err);
+ *          schema, also of what is not stored
+ * threads  any */
+bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node,
+                                   const mospt_vertex *vertices, uint8_t *out, mospt_err *err);

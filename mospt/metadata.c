@@ -10,7 +10,7 @@
 /* The text ends in a line with the checksum of all bytes before it, so that no byte of the file is
  * unchecked. */
 static const char TAIL_FORMAT[] = ",\n  \"checksum\": \"%016" PRIx64 "\"\n}\n";
-enum { TAIL_SIZE = 37, TEXT_SIZE_MAX = 1 << 30, VERSION = 2 };
+enum { TAIL_SIZE = 37, TEXT_SIZE_MAX = 1 << 30 };
 
 void mospt_metadata_fini(mospt_metadata *m)
 {
@@ -46,6 +46,14 @@ static json_t *hash_to_json(uint64_t hash)
     return json_string(text);
 }
 
+static json_t *bytes_to_json(const uint8_t *bytes, size_t size)
+{
+    char text[2 * MOSPT_CONSTANT_SIZE_MAX + 1];
+    for (size_t i = 0; i < size; i++)
+        snprintf(text + 2 * i, 3, "%02x", bytes[i]);
+    return json_string(text);
+}
+
 static json_t *reals_to_json(const double *values, size_t count)
 {
     json_t *array = json_array();
@@ -67,9 +75,13 @@ static json_t *attributes_to_json(const mospt_schema *schema)
     json_t *array = json_array();
     for (uint32_t i = 0; i < schema->count; i++) {
         const mospt_attribute *a = &schema->at[i];
-        json_array_append_new(array, json_pack("{s:o, s:s, s:i}", "name", text_to_json(a->name),
-                                               "type", mospt_type_name(a->type), "components",
-                                               (int)a->components));
+        json_t *json = json_pack("{s:o, s:s, s:i}", "name", text_to_json(a->name), "type",
+                                 mospt_type_name(a->type), "components", (int)a->components);
+        if (a->storage == MOSPT_CONSTANT)
+            json_object_set_new(json, "constant",
+                                bytes_to_json(a->constant, mospt_attribute_size(a)));
+        if (a->storage == MOSPT_OF_COLOUR) json_object_set_new(json, "of", json_string("colour"));
+        json_array_append_new(array, json);
     }
     return array;
 }
@@ -112,8 +124,8 @@ static json_t *metadata_to_json(const mospt_metadata *m)
     json_t *unfinished = m->unfinished.commit > 0 ? unfinished_to_json(&m->unfinished) : NULL;
     return json_pack("{s:s, s:i, s:I, s:o*, s:I, s:o, s:f, s:{s:o, s:o}, s:o, s:s, s:i, s:i, s:o, "
                      "s:o, s:{s:s, s:I, s:o}, s:o, s:o}",
-                     "format", "instantpoints dataset", "version", VERSION, "generation",
-                     (json_int_t)m->generation, "unfinished", unfinished, "points",
+                     "format", "instantpoints dataset", "version", MOSPT_DATASET_VERSION,
+                     "generation", (json_int_t)m->generation, "unfinished", unfinished, "points",
                      (json_int_t)m->point_count, "points_hash", hash_to_json(m->points_hash),
                      "position_error", m->position_error, "bounds", "min", reals_to_json(m->low, 3),
                      "max", reals_to_json(m->high, 3), "grid", grid_to_json(&m->grid), "refinement",
@@ -237,6 +249,38 @@ static void grid_from_json(parse *p, json_t *json, mospt_grid *g)
     if (p->ok && !mospt_grid_is_valid(g)) wrong(p, "grid");
 }
 
+static bool bytes_from_json(const json_t *json, size_t size, uint8_t *out)
+{
+    const char *text = json_string_value(json);
+    if (text == NULL || strlen(text) != 2 * size) return false;
+    for (size_t i = 0; i < size; i++)
+        if (strspn(text + 2 * i, "0123456789abcdef") < 2 ||
+            sscanf(text + 2 * i, "%2hhx", &out[i]) != 1)
+            return false;
+    return true;
+}
+
+/* How the last attribute is kept; in planes, unless something is said. */
+static void storage_from_json(parse *p, json_t *item, mospt_schema *schema)
+{
+    uint32_t k = schema->count - 1;
+    const mospt_attribute *a = &schema->at[k];
+    uint8_t constant[MOSPT_CONSTANT_SIZE_MAX];
+    json_t *same = json_object_get(item, "constant"), *of = json_object_get(item, "of");
+    const char *source = json_string_value(of);
+    if (same != NULL) {
+        if (of != NULL || !mospt_attribute_can_be(a, MOSPT_CONSTANT) ||
+            !bytes_from_json(same, mospt_attribute_size(a), constant))
+            wrong(p, "constant");
+        else mospt_schema_keep(schema, k, MOSPT_CONSTANT, constant);
+    } else if (of != NULL) {
+        if (source == NULL || strcmp(source, "colour") != 0 ||
+            !mospt_attribute_can_be(a, MOSPT_OF_COLOUR))
+            wrong(p, "of");
+        else mospt_schema_keep(schema, k, MOSPT_OF_COLOUR, NULL);
+    }
+}
+
 static void schema_from_json(parse *p, json_t *array, mospt_schema *schema)
 {
     size_t i;
@@ -250,8 +294,11 @@ static void schema_from_json(parse *p, json_t *array, mospt_schema *schema)
         if (!p->ok) return;
         if (name == NULL || type_name == NULL || !mospt_type_from_name(type_name, &type) ||
             mospt_schema_find(schema, name) >= 0 ||
-            !mospt_schema_add(schema, name, type, components, NULL))
+            !mospt_schema_add(schema, name, type, components, NULL)) {
             wrong(p, "attributes");
+            return;
+        }
+        storage_from_json(p, item, schema);
     }
 }
 
@@ -324,10 +371,10 @@ static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
         return;
     }
     json_int_t version = json_integer_value(json_object_get(json, "version"));
-    if (version != VERSION) {
+    if (version != MOSPT_DATASET_VERSION && version != MOSPT_DATASET_VERSION - 1) {
         p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path),
-                              "has version %lld, this program reads version %d", (long long)version,
-                              VERSION);
+                              "has version %lld, this program reads versions %d and %d",
+                              (long long)version, MOSPT_DATASET_VERSION - 1, MOSPT_DATASET_VERSION);
         return;
     }
     json_t *bounds = get(p, json, "bounds"), *hierarchy = get(p, json, "hierarchy");

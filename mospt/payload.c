@@ -103,10 +103,13 @@ static void pack_planes(const mospt_schema *schema, uint8_t *planes, uint32_t co
 {
     uint8_t columns[WINDOW][BLOCK];
     size_t stride = mospt_record_size(schema), begin = stride; /* of the columns; none yet */
+    size_t before = 0; /* bytes of a point in the planes before */
     for (uint32_t k = 0; k < schema->count; k++) {
         const mospt_attribute *a = &schema->at[k];
         size_t size = mospt_attribute_size(a), offset = sizeof(mospt_vertex) + a->offset;
-        uint8_t *to = planes + (size_t)count * a->offset + start * size;
+        uint8_t *to = planes + count * before + start * size;
+        if (a->storage != MOSPT_IN_PLANE) continue;
+        before += size;
         if (size > 2) {
             gather(to, from, offset, size, n);
             continue;
@@ -171,10 +174,47 @@ uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *rec
     }
     node->count = count;
     node->codec = MOSPT_CODEC_RAW;
-    node->payload_size = (uint64_t)count * mospt_record_size(schema);
+    node->payload_size = mospt_payload_size(schema, count);
     node->vertices_hash = mospt_hash(out, vertices_size);
-    node->attributes_hash = mospt_hash(planes, (size_t)count * schema->row_size);
+    node->attributes_hash = mospt_hash(planes, (size_t)count * schema->stored_size);
     return points_hash;
+}
+
+static void fill_constant(const mospt_attribute *a, uint32_t count, uint8_t *plane)
+{
+    size_t size = mospt_attribute_size(a);
+    for (uint32_t i = 0; i < count; i++)
+        memcpy(plane + i * size, a->constant, size);
+}
+
+static void fill_of_colour(const mospt_vertex *vertices, uint32_t count, uint8_t *plane)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const mospt_vertex *v = &vertices[i];
+        const uint8_t rgb[] = {v->r, v->r, v->g, v->g, v->b, v->b};
+        memcpy(plane + i * sizeof rgb, rgb, sizeof rgb);
+    }
+}
+
+void mospt_payload_complete(const mospt_schema *schema, const mospt_vertex *vertices,
+                            uint32_t count, uint8_t *planes)
+{
+    size_t stored = schema->stored_size; /* bytes of a point in the planes up to this one */
+    for (uint32_t k = schema->count; k-- > 0;) {
+        const mospt_attribute *a = &schema->at[k];
+        uint8_t *plane = planes + (size_t)count * a->offset;
+        switch (a->storage) {
+        case MOSPT_CONSTANT:
+            fill_constant(a, count, plane);
+            break;
+        case MOSPT_OF_COLOUR:
+            fill_of_colour(vertices, count, plane);
+            break;
+        default: /* those before it stand in front of both places */
+            stored -= mospt_attribute_size(a);
+            memmove(plane, planes + count * stored, count * mospt_attribute_size(a));
+        }
+    }
 }
 
 uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices,

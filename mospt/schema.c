@@ -1,5 +1,6 @@
 #include "mospt/schema.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -161,10 +162,13 @@ int mospt_schema_find(const mospt_schema *schema, const char *name)
 
 static void lay_out(mospt_schema *schema)
 {
-    schema->row_size = 0;
+    schema->row_size = schema->stored_size = 0;
     for (uint32_t i = 0; i < schema->count; i++) {
-        schema->at[i].offset = schema->row_size;
-        schema->row_size += (uint32_t)mospt_attribute_size(&schema->at[i]);
+        mospt_attribute *a = &schema->at[i];
+        uint32_t size = (uint32_t)mospt_attribute_size(a);
+        a->offset = schema->row_size;
+        schema->row_size += size;
+        schema->stored_size += a->storage == MOSPT_IN_PLANE ? size : 0;
     }
 }
 
@@ -206,4 +210,20 @@ bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, u
     }
     lay_out(schema);
     return true;
+}
+
+bool mospt_attribute_can_be(const mospt_attribute *a, mospt_storage storage)
+{
+    if (storage == MOSPT_CONSTANT) return mospt_attribute_size(a) <= MOSPT_CONSTANT_SIZE_MAX;
+    return storage == MOSPT_IN_PLANE || (a->type == MOSPT_U16 && a->components == 3);
+}
+
+void mospt_schema_keep(mospt_schema *schema, uint32_t attribute, mospt_storage storage,
+                       const uint8_t *constant)
+{
+    mospt_attribute *a = &schema->at[attribute];
+    assert(mospt_attribute_can_be(a, storage));
+    a->storage = storage;
+    if (storage == MOSPT_CONSTANT) memcpy(a->constant, constant, mospt_attribute_size(a));
+    lay_out(schema);
 }

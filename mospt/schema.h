@@ -7,7 +7,12 @@
 #pragma once
 #include "mospt/err.h"
 
-enum { MOSPT_ATTRIBUTES_MAX = 64, MOSPT_ATTRIBUTE_NAME_MAX = 48, MOSPT_ROW_SIZE_MAX = 16384 };
+enum {
+    MOSPT_ATTRIBUTES_MAX = 64,
+    MOSPT_ATTRIBUTE_NAME_MAX = 48,
+    MOSPT_ROW_SIZE_MAX = 16384,
+    MOSPT_CONSTANT_SIZE_MAX = 8,
+};
 
 typedef enum {
     MOSPT_U8,
@@ -23,16 +28,28 @@ typedef enum {
     MOSPT_TYPE_COUNT,
 } mospt_type;
 
+/* How the payloads of a dataset keep an attribute. */
+typedef enum {
+    MOSPT_IN_PLANE,  /* of each point */
+    MOSPT_CONSTANT,  /* not at all: all points have the same */
+    MOSPT_OF_COLOUR, /* not at all: three u16, of which each is its display colour times 257, so
+                        that both bytes are that */
+    MOSPT_STORAGE_COUNT,
+} mospt_storage;
+
 typedef struct {
     char name[MOSPT_ATTRIBUTE_NAME_MAX];
     mospt_type type;
     uint32_t components; /* 1 to 255 values of `type` per point */
     uint32_t offset;     /* bytes from the start of a row; rows are packed, nothing is aligned */
+    mospt_storage storage;
+    uint8_t constant[MOSPT_CONSTANT_SIZE_MAX]; /* with MOSPT_CONSTANT: as in a row */
 } mospt_attribute;
 
 typedef struct {
     uint32_t count;
-    uint32_t row_size; /* bytes of one point's attributes */
+    uint32_t row_size;    /* bytes of one point's attributes */
+    uint32_t stored_size; /* of these, bytes in planes */
     mospt_attribute at[MOSPT_ATTRIBUTES_MAX];
 } mospt_schema;
 
@@ -63,3 +80,11 @@ int mospt_schema_find(const mospt_schema *schema, const char *name);
  * number of components */
 bool mospt_schema_add(mospt_schema *schema, const char *name, mospt_type type, uint32_t components,
                       mospt_err *err);
+
+/* True if an attribute is one that may be kept so. */
+bool mospt_attribute_can_be(const mospt_attribute *a, mospt_storage storage);
+
+/* Says how an attribute is kept, which can be so.
+ * constant [size of the attribute], as in a row; only for MOSPT_CONSTANT */
+void mospt_schema_keep(mospt_schema *schema, uint32_t attribute, mospt_storage storage,
+                       const uint8_t *constant);

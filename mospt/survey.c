@@ -192,7 +192,7 @@ static bool visit(surveyor *s, uint32_t node, const place *above, size_t above_c
     }
     if (!mospt_dataset_read_vertices(d, node, v, err)) goto done;
     if (s->points != NULL) {
-        if (!mospt_dataset_read_attributes(d, node, planes, err)) goto done;
+        if (!mospt_dataset_read_attributes(d, node, v, planes, err)) goto done;
         add_attributes(s, count, planes);
         add_colours(s, count, v, planes);
     }

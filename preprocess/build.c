@@ -31,8 +31,9 @@ typedef struct {
     prep_store *store;
     prep_arena *arena;
     mospt_writer *writer;
-    uint64_t identity;   /* of this build, see prep_provenance_hash() */
-    prep_resume *resume; /* what an interrupted one has left; NULL: nothing */
+    prep_implied implied; /* by all points */
+    uint64_t identity;    /* of this build, see prep_provenance_hash() */
+    prep_resume *resume;  /* what an interrupted one has left; NULL: nothing */
     prep_phase phase;
     uint64_t points_total; /* 0: unknown */
     double phase_start;
@@ -193,7 +194,8 @@ static bool check_disks(build *b, mospt_err *err)
 typedef struct {
     const prep_batch *batch;
     prep_packer packer;
-    prep_pack_sums *sums; /* [slices] */
+    prep_pack_sums *sums;  /* [slices] */
+    prep_implied *implied; /* [slices] */
 } packing;
 
 static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
@@ -202,7 +204,9 @@ static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
     uint32_t begin = slice * PREP_PASS_SLICE, left = p->batch->count - begin;
     uint32_t count = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
     p->sums[slice] = prep_pack_sums_empty;
-    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice]);
+    p->implied[slice] = (prep_implied){0};
+    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice],
+              &p->implied[slice]);
     return p->sums[slice].outside ? 0 : count;
 }
 
@@ -221,8 +225,11 @@ static bool stream_points(build *b, prep_pass *pass, uint32_t batch_slices, prep
     prep_stream *stream = NULL;
     uint64_t points = 0;
     packing p = {.packer = {.grid = &b->metadata->grid, .schema = &b->metadata->schema},
-                 .sums = malloc(batch_slices * sizeof *p.sums)};
-    bool ok = p.sums != NULL || mospt_err_nomem(err, batch_slices * sizeof *p.sums);
+                 .sums = malloc(batch_slices * sizeof *p.sums),
+                 .implied = malloc(batch_slices * sizeof *p.implied)};
+    bool ok = (p.sums != NULL && p.implied != NULL) ||
+              mospt_err_nomem(err, batch_slices * (sizeof *p.sums + sizeof *p.implied));
+    b->implied = (prep_implied){0};
     ok = ok && prep_stream_open(source, batch_slices * PREP_PASS_SLICE, &stream, err);
     while (ok && !*outside) {
         uint32_t scan = 0;
@@ -235,13 +242,14 @@ static bool stream_points(build *b, prep_pass *pass, uint32_t batch_slices, prep
         for (uint32_t i = 0; i < slices; i++) {
             *outside = *outside || p.sums[i].outside;
             prep_pack_sums_add(&of_scan[scan], &p.sums[i]);
+            prep_implied_add(&b->implied, p.packer.schema, &p.implied[i]);
         }
         points += p.batch->count;
         if (ok && !tell(b, points))
             ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     }
     prep_stream_close(stream);
-    free(p.sums);
+    free(p.sums), free(p.implied);
     return ok;
 }
 
@@ -307,6 +315,7 @@ static bool write_tree(build *b, prep_pass *pass, const prep_pack_sums *of_scan,
         prep_pass_abandon(pass);
         return false;
     }
+    prep_implied_apply(&b->implied, &b->metadata->schema);
     b->metadata->point_count = b->points_total;
     if (b->resume != NULL) {
         const mospt_metadata *kept = prep_resume_metadata(b->resume);

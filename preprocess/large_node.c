@@ -188,7 +188,8 @@ static bool write_run(large *l, const cell *c, const uint8_t *payload, uint32_t 
     size_t of_cell = c->spool.count, of_node = l->node.count, before = 0;
     for (uint32_t k = 0; k <= schema->count; k++) {
         const mospt_attribute *a = k > 0 ? &schema->at[k - 1] : NULL;
-        size_t size = a != NULL ? mospt_type_size(a->type) * a->components : sizeof(mospt_vertex);
+        size_t size = a != NULL ? mospt_attribute_size(a) : sizeof(mospt_vertex);
+        if (a != NULL && a->storage != MOSPT_IN_PLANE) continue;
         if (!mospt_writer_write_part(l->env->writer, &l->node, before * of_node + to * size,
                                      payload + before * of_cell + begin * size,
                                      (end - begin) * size, err))
@@ -237,14 +238,13 @@ static bool write_cell(large *l, cell *c, const uint8_t *payload, uint64_t point
 static bool make_node(large *l, mospt_err *err)
 {
     uint32_t index;
-    size_t stride = mospt_record_size(l->env->shape->schema);
     l->node = (mospt_node){
         .level = (uint16_t)l->part->level,
         .child_mask = l->part->child_mask,
         .corner = {l->part->corner[0], l->part->corner[1], l->part->corner[2]},
     };
     if (!divide(l, err) || !make_all(l, note_cell, err) || !sum_up(l, err)) return false;
-    l->node.payload_size = l->node.count * stride;
+    l->node.payload_size = mospt_payload_size(l->env->shape->schema, l->node.count);
     if (!mospt_writer_place(l->env->writer, &l->node, &index, err) ||
         !make_all(l, write_cell, err) || !mospt_writer_hash(l->env->writer, &l->node, err))
         return false;

@@ -281,7 +281,7 @@ static uint32_t block_size(const prep_packer *p, const origins *o)
 }
 
 void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end,
-               uint8_t *records, prep_pack_sums *sums)
+               uint8_t *records, prep_pack_sums *sums, prep_implied *implied)
 {
     size_t stride = mospt_record_size(p->schema);
     origins from = find_origins(p);
@@ -291,5 +291,6 @@ void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, ui
         if (batch->packed.unpack != NULL) pack_packed(p, &from, batch, i, n, records, sums);
         else pack_planes(p, &from, batch, i, n, records, sums);
         sums->hash += mospt_hash_records(records, stride, n);
+        prep_implied_look(implied, p->schema, records, n);
     }
 }

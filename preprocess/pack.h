@@ -3,6 +3,7 @@
 #pragma once
 #include "mospt/payload.h"
 #include "preprocess/batch.h"
+#include "preprocess/implied.h"
 
 typedef struct {
     const mospt_grid *grid; /* borrowed */
@@ -25,6 +26,8 @@ void prep_pack_sums_add(prep_pack_sums *sums, const prep_pack_sums *more);
 
 /* Packs points [begin, end) of a batch.
  * records  out, [end - begin][mospt_record_size()]
+ * sums     these points are added to them
+ * implied  is to look at them
  * threads  any */
 void prep_pack(const prep_packer *packer, const prep_batch *batch, uint32_t begin, uint32_t end,
-               uint8_t *records, prep_pack_sums *sums);
+               uint8_t *records, prep_pack_sums *sums, prep_implied *implied);

@@ -105,9 +105,10 @@ uint64_t prep_provenance_hash(const mospt_metadata *m, const prep_source *source
     const prep_scan_options *o = &source->options;
     const mospt_grid *g = &m->grid;
     const double reals[] = {g->offset[0], g->offset[1], g->offset[2], g->step};
-    const int64_t integers[] = {g->base[0], g->base[1],  g->base[2],       g->bits,
-                                g->root[0], g->root[1],  g->root[2],       m->inner_depth,
-                                dedupe,     o->has_crop, m->add_threshold, o->has_range};
+    const int64_t integers[] = {
+        g->base[0],       g->base[1],   g->base[2],           g->bits, g->root[0],
+        g->root[1],       g->root[2],   m->inner_depth,       dedupe,  o->has_crop,
+        m->add_threshold, o->has_range, MOSPT_DATASET_VERSION};
     uint64_t hash = add_text(0, IPTS_VERSION);
     hash = mospt_hash_more(hash, reals, sizeof reals);
     hash = mospt_hash_more(hash, integers, sizeof integers);

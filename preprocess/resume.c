@@ -21,7 +21,7 @@ struct prep_resume {
 /* All nodes, by whichever thread has nothing to do. */
 typedef struct {
     prep_resume *resume;
-    size_t largest; /* payload, bytes */
+    size_t largest; /* bytes of the records of a node */
     atomic_uint next;
 } reading;
 
@@ -29,9 +29,10 @@ static void read_node(prep_resume *r, uint32_t i, uint8_t *payload)
 {
     const mospt_dataset *d = r->dataset;
     const mospt_node *n = &d->hierarchy.nodes[i];
+    mospt_vertex *vertices = (mospt_vertex *)(void *)payload;
     uint8_t *attributes = payload + mospt_dataset_vertices_size(d, i);
-    if (!mospt_dataset_read_vertices(d, i, (mospt_vertex *)(void *)payload, NULL) ||
-        !mospt_dataset_read_attributes(d, i, attributes, NULL))
+    if (!mospt_dataset_read_vertices(d, i, vertices, NULL) ||
+        !mospt_dataset_read_attributes(d, i, vertices, attributes, NULL))
         return;
     r->kept[i].is_there = true;
     r->kept[i].points_hash =
@@ -54,9 +55,11 @@ static void read_nodes(void *context, uint32_t thread)
 static void read_all(prep_resume *resume, prep_workers *workers)
 {
     const mospt_hierarchy *h = &resume->dataset->hierarchy;
+    size_t record_size = mospt_record_size(&resume->dataset->metadata.schema);
     reading r = {.resume = resume, .largest = 1};
     for (uint32_t i = 0; i < h->count; i++)
-        if (h->nodes[i].payload_size > r.largest) r.largest = (size_t)h->nodes[i].payload_size;
+        if (h->nodes[i].count * record_size > r.largest)
+            r.largest = h->nodes[i].count * record_size;
     prep_workers_run(workers, prep_workers_count(workers), read_nodes, &r);
 }
 

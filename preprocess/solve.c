@@ -106,7 +106,7 @@ static bool keep(const solver *s, const part *p, uint8_t child_mask, uint32_t ce
                                .level = (uint16_t)p->level,
                                .child_mask = child_mask,
                                .count = count,
-                               .payload_size = (uint64_t)count * mospt_record_size(s->shape->schema)}};
+                               .payload_size = mospt_payload_size(s->shape->schema, count)}};
     return true;
 }
 

@@ -71,17 +71,18 @@ static bool read_painted(const mospt_dataset *dataset, const rend_paint *paint, 
                          finished *f, mospt_err *err)
 {
     uint8_t *planes = NULL;
-    size_t planes_size = 0;
+    f->bytes_read = f->size;
     bool ok = mospt_dataset_read_vertices(dataset, node, f->loaded.vertices, err);
     if (ok && rend_paint_needs_attributes(paint)) {
-        planes_size = dataset->hierarchy.nodes[node].count * dataset->metadata.schema.row_size;
-        planes = malloc(planes_size + 1);
-        ok = planes != NULL ? mospt_dataset_read_attributes(dataset, node, planes, err)
-                            : mospt_err_nomem(err, planes_size);
+        size_t size = dataset->hierarchy.nodes[node].count * dataset->metadata.schema.row_size;
+        planes = malloc(size + 1);
+        ok = planes != NULL
+                 ? mospt_dataset_read_attributes(dataset, node, f->loaded.vertices, planes, err)
+                 : mospt_err_nomem(err, size);
+        f->bytes_read += mospt_dataset_planes_size(dataset, node);
     }
     if (ok) rend_paint_apply(paint, node, planes, f->loaded.vertices);
     free(planes);
-    f->bytes_read = f->size + planes_size;
     return ok;
 }
 

@@ -38,7 +38,7 @@ static bool read_block(const mospt_dataset *d, uint32_t node, block *out, mospt_
         return mospt_err_nomem(err, size + planes_size);
     }
     if (!mospt_dataset_read_vertices(d, node, b.vertices, NULL) ||
-        !mospt_dataset_read_attributes(d, node, b.planes, NULL)) {
+        !mospt_dataset_read_attributes(d, node, b.vertices, b.planes, NULL)) {
         free(b.vertices);
         free(b.planes);
         b = (block){0};

@@ -73,7 +73,7 @@ static points read_dataset(const char *path, mospt_metadata *metadata_copy)
         uint8_t *planes = malloc(n * d->metadata.schema.row_size);
         assert_true(v != NULL && planes != NULL);
         CORE_NEED(mospt_dataset_read_vertices(d, i, v, &err));
-        CORE_NEED(mospt_dataset_read_attributes(d, i, planes, &err));
+        CORE_NEED(mospt_dataset_read_attributes(d, i, v, planes, &err));
         for (uint32_t j = 0; j < n; j++) {
             point *p = &all.at[all.count++];
             uint16_t scan;
@@ -848,8 +848,7 @@ static void progress_ends_where_the_points_do(void **state)
     build_good(&(prep_build_options){.progress = count_down, .context = &c}, &result);
     assert_true(c.left < UINT32_MAX - 1);
     assert_true(result.peak_memory > 0 && result.total_seconds > 0);
-    uint64_t payload = 30000 * (uint64_t)(sizeof(mospt_vertex) + result.metadata.schema.row_size);
-    assert_int_equal(result.payload_bytes, payload);
+    assert_int_equal(result.payload_bytes, mospt_payload_size(&result.metadata.schema, 30000));
     prep_build_result_fini(&result);
     remove_path(output);
     empty_scans();

@@ -156,7 +156,7 @@ static void what_is_read_is_what_was_put_in(void **state)
         uint8_t *planes = malloc(count * site.schema.row_size);
         assert_true(v != NULL && planes != NULL);
         CORE_NEED(mospt_dataset_read_vertices(d, i, v, &err));
-        CORE_NEED(mospt_dataset_read_attributes(d, i, planes, &err));
+        CORE_NEED(mospt_dataset_read_attributes(d, i, v, planes, &err));
         hash += mospt_payload_points_hash(&site.schema, (const uint8_t *)v, planes, count);
         free(v), free(planes);
     }
@@ -291,7 +291,7 @@ static void metadata_root(mospt_metadata *m)
 }
 static void metadata_schema(mospt_metadata *m)
 {
-    m->schema.at[1].type = MOSPT_U16, m->schema.row_size -= 2;
+    m->schema.at[1].type = MOSPT_U16, m->schema.row_size -= 2, m->schema.stored_size -= 2;
 }
 
 static void a_liar_with_the_right_checksums_is_found(void **state)

@@ -160,7 +160,7 @@ static void assert_painted(const rend_loaded *loaded, const rend_paint *paint)
     uint8_t *planes = malloc(planes_size + 1);
     mospt_err err = {0};
     CORE_NEED(mospt_dataset_read_vertices(site.dataset, loaded->node, expected, &err));
-    CORE_NEED(mospt_dataset_read_attributes(site.dataset, loaded->node, planes, &err));
+    CORE_NEED(mospt_dataset_read_attributes(site.dataset, loaded->node, expected, planes, &err));
     rend_paint_apply(paint, loaded->node, planes, expected);
     assert_memory_equal(loaded->vertices, expected, size);
     free(planes);

@@ -62,6 +62,11 @@ static mospt_metadata make(const char *name)
     CORE_NEED(mospt_schema_add(&m.schema, "scan", MOSPT_U16, 1, &err));
     CORE_NEED(mospt_schema_add(&m.schema, "normal", MOSPT_F32, 3, &err));
     CORE_NEED(mospt_schema_add(&m.schema, name, MOSPT_I64, 255, &err));
+    CORE_NEED(mospt_schema_add(&m.schema, "rgb", MOSPT_U16, 3, &err));
+    CORE_NEED(mospt_schema_add(&m.schema, "gps_time", MOSPT_F64, 1, &err));
+    mospt_schema_keep(&m.schema, 3, MOSPT_OF_COLOUR, NULL);
+    mospt_schema_keep(&m.schema, 4, MOSPT_CONSTANT,
+                      (const uint8_t[]){0, 1, 2, 127, 128, 254, 255, 9});
     for (uint32_t i = 0; i < 3; i++) {
         mospt_source *s = &m.sources[i];
         s->name = strdup(name), s->scan = strdup(i ? name : ""),
@@ -93,9 +98,13 @@ static void assert_same(const mospt_metadata *a, const mospt_metadata *b, const 
     assert_memory_equal(&a->grid, &b->grid, sizeof a->grid);
     assert_int_equal(a->schema.count, b->schema.count);
     assert_int_equal(a->schema.row_size, b->schema.row_size);
+    assert_int_equal(a->schema.stored_size, b->schema.stored_size);
     for (uint32_t k = 0; k < 2; k++)
         assert_string_equal(a->schema.at[k].name, b->schema.at[k].name);
-    for (uint32_t k = 0; k < 3; k++) {
+    for (uint32_t k = 0; k < 5; k++) {
+        assert_int_equal(a->schema.at[k].storage, b->schema.at[k].storage);
+        assert_memory_equal(a->schema.at[k].constant, b->schema.at[k].constant,
+                            sizeof a->schema.at[k].constant);
         assert_int_equal(a->schema.at[k].type, b->schema.at[k].type);
         assert_int_equal(a->schema.at[k].components, b->schema.at[k].components);
         assert_int_equal(a->schema.at[k].offset, b->schema.at[k].offset);
@@ -243,8 +252,19 @@ static char *replaced(const char *text, size_t size, const char *what, const cha
 static void a_liar_with_the_right_checksum_is_refused(void **state)
 {
     static const char *const lies[][2] = {
-        {"\"version\": 2", "\"version\": 1"},
-        {"\"version\": 2", "\"version\": \"2\""},
+        {"\"version\": 3", "\"version\": 1"},
+        {"\"version\": 3", "\"version\": 4"},
+        {"\"version\": 3", "\"version\": \"3\""},
+        {"\"0001027f80feff09\"", "\"0001027f80feff\""},
+        {"\"0001027f80feff09\"", "\"0001027f80feff0900\""},
+        {"\"0001027f80feff09\"", "\"0001027f80feff0x\""},
+        {"\"0001027f80feff09\"", "\"0001027f80feff 9\""},
+        {"\"0001027f80feff09\"", "1"},
+        {"\"0001027f80feff09\"", "\"0001027f80feff09\", \"of\": \"colour\""},
+        {"\"components\": 255", "\"components\": 255, \"constant\": \"00\""},
+        {"\"components\": 255", "\"components\": 255, \"of\": \"colour\""},
+        {"\"of\": \"colour\"", "\"of\": \"color\""},
+        {"\"of\": \"colour\"", "\"of\": 1"},
         {"\"instantpoints dataset\"", "\"another dataset\""},
         {"\"additive\"", "\"replacing\""},
         {"\"additive\"", "7"},
@@ -317,6 +337,26 @@ static void a_liar_with_the_right_checksum_is_refused(void **state)
     mospt_metadata_fini(&m);
 }
 
+/* It knows nothing of attributes that are not stored. */
+static void what_the_version_before_wrote_is_read(void **state)
+{
+    mospt_err err = {0};
+    mospt_metadata m = make("n"), back;
+    size_t size, new_size;
+    (void)state;
+    for (uint32_t k = 0; k < m.schema.count; k++)
+        mospt_schema_keep(&m.schema, k, MOSPT_IN_PLANE, NULL);
+    CORE_NEED(mospt_metadata_write(&m, folder, &err));
+    char *text = (char *)core_file_read(path, &size);
+    char *old = replaced(text, size - TAIL, "\"version\": 3", "\"version\": 2", &new_size);
+    write_signed(old, new_size);
+    CORE_NEED(mospt_metadata_read(folder, &back, &err));
+    assert_int_equal(back.schema.stored_size, back.schema.row_size);
+    assert_int_equal(back.schema.row_size, m.schema.row_size);
+    free(text), free(old);
+    mospt_metadata_fini(&m), mospt_metadata_fini(&back);
+}
+
 static void every_line_that_is_missing_or_changed_is_an_error_or_good_metadata(void **state)
 {
     mospt_err err = {0};
@@ -372,6 +412,7 @@ int main(void)
         cmocka_unit_test(every_truncation_is_a_format_error),
         cmocka_unit_test(every_bit_is_checked),
         cmocka_unit_test(a_liar_with_the_right_checksum_is_refused),
+        cmocka_unit_test(what_the_version_before_wrote_is_read),
         cmocka_unit_test(every_line_that_is_missing_or_changed_is_an_error_or_good_metadata),
         cmocka_unit_test(no_metadata_is_no_dataset),
     };

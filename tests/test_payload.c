@@ -10,6 +10,16 @@
 
 enum { SHIFT = 3 };
 
+/* Makes an attribute of a record what its schema says that it is. */
+static void obey(const mospt_attribute *a, uint8_t *record)
+{
+    const uint8_t *c = record + offsetof(mospt_vertex, r);
+    const uint8_t rgb[] = {c[0], c[0], c[1], c[1], c[2], c[2]};
+    uint8_t *row = record + sizeof(mospt_vertex) + a->offset;
+    if (a->storage == MOSPT_CONSTANT) memcpy(row, a->constant, mospt_attribute_size(a));
+    if (a->storage == MOSPT_OF_COLOUR) memcpy(row, rgb, sizeof rgb);
+}
+
 static void check(const mospt_schema *schema, uint32_t record_count, uint32_t count)
 {
     size_t stride = mospt_record_size(schema);
@@ -23,22 +33,31 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
                 picked != NULL);
     for (size_t i = 0; i < record_count * stride; i++)
         records[i] = (uint8_t)core_random(&random);
+    for (uint32_t i = 0; i < record_count; i++)
+        for (uint32_t k = 0; k < schema->count; k++)
+            obey(&schema->at[k], records + i * stride);
     for (uint32_t i = 0; i < count; i++) {
         order[i] = core_below(&random, record_count);
         memcpy(picked + i * stride, records + order[i] * stride, stride);
     }
-    out[count * stride] = 0xa5;
+    uint64_t payload_size = mospt_payload_size(schema, count);
+    memset(out, 0xa5, count * stride + 1);
     /* Whole blocks of 2^SHIFT, as a spool has them. */
     for (uint32_t b = 0; b <= record_count >> SHIFT; b++)
         blocks[b] = records + ((size_t)b << SHIFT) * stride;
     uint64_t hash = mospt_payload_pack(schema, &(mospt_records){blocks, stride, SHIFT}, order,
                                        count, out, &node);
     assert_true(hash == mospt_hash_records(picked, stride, count));
-    assert_int_equal(out[count * stride], 0xa5);
+    for (uint64_t i = payload_size; i <= count * stride; i++)
+        assert_int_equal(out[i], 0xa5);
     assert_int_equal(node.count, count);
     assert_int_equal(node.level, 3);
-    assert_int_equal(node.payload_size, count * stride);
+    assert_int_equal(node.payload_size, payload_size);
     uint8_t *planes = out + count * sizeof(mospt_vertex);
+    assert_true(node.vertices_hash == mospt_hash(out, count * sizeof(mospt_vertex)));
+    assert_true(node.attributes_hash == mospt_hash(planes, count * (size_t)schema->stored_size));
+    mospt_payload_complete(schema, (const mospt_vertex *)(const void *)out, count, planes);
+    assert_int_equal(out[count * stride], 0xa5);
     for (uint32_t i = 0; i < count; i++) {
         assert_memory_equal(out + i * sizeof(mospt_vertex), picked + i * stride,
                             sizeof(mospt_vertex));
@@ -48,8 +67,6 @@ static void check(const mospt_schema *schema, uint32_t record_count, uint32_t co
                                 picked + i * stride + sizeof(mospt_vertex) + at, size);
         }
     }
-    assert_true(node.vertices_hash == mospt_hash(out, count * sizeof(mospt_vertex)));
-    assert_true(node.attributes_hash == mospt_hash(planes, count * (size_t)schema->row_size));
     assert_true(mospt_payload_points_hash(schema, out, planes, count) ==
                 mospt_hash_records(picked, stride, count));
     free(records), free(out), free(order), free(picked), free(blocks);
@@ -86,6 +103,28 @@ static void attributes_of_a_byte_or_two_are_packed(void **state)
     for (int i = 0; i < 40; i++) {
         snprintf(name, sizeof name, "a%d", i);
         CORE_NEED(mospt_schema_add(&s, name, i % 16 == 15 ? MOSPT_U16 : MOSPT_I8, 1, &err));
+        for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++)
+            check(&s, 50, counts[k]);
+    }
+}
+
+/* Whichever they are, first, last or all. */
+static void what_is_not_stored_comes_back(void **state)
+{
+    static const uint32_t counts[] = {0, 1, 17, 300};
+    static const uint8_t constant[MOSPT_CONSTANT_SIZE_MAX] = {1, 0, 255, 7, 6, 5, 4, 3};
+    (void)state;
+    for (uint32_t kept = 0; kept < 3 * 3 * 3 * 3 * 3; kept++) {
+        mospt_schema s = {0};
+        mospt_err err = {0};
+        CORE_NEED(mospt_schema_add(&s, "a", MOSPT_U8, 1, &err));
+        CORE_NEED(mospt_schema_add(&s, "rgb", MOSPT_U16, 3, &err));
+        CORE_NEED(mospt_schema_add(&s, "b", MOSPT_F64, 1, &err));
+        CORE_NEED(mospt_schema_add(&s, "twice", MOSPT_U16, 3, &err));
+        CORE_NEED(mospt_schema_add(&s, "c", MOSPT_U16, 2, &err));
+        for (uint32_t k = 0, rest = kept; k < s.count; k++, rest /= 3)
+            if (mospt_attribute_can_be(&s.at[k], (mospt_storage)(rest % 3)))
+                mospt_schema_keep(&s, k, (mospt_storage)(rest % 3), constant);
         for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++)
             check(&s, 50, counts[k]);
     }
@@ -131,6 +170,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(planes_hold_what_records_held),
         cmocka_unit_test(attributes_of_a_byte_or_two_are_packed),
+        cmocka_unit_test(what_is_not_stored_comes_back),
         cmocka_unit_test(the_widest_rows_are_packed),
         cmocka_unit_test(the_sum_of_hashes_does_not_depend_on_the_order_but_on_every_byte),
     };

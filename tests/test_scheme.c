@@ -56,7 +56,7 @@ static uint32_t slow_values(const rend_paint *paint, double **out)
             uint8_t *planes =
                 malloc(h->nodes[n].count * site.dataset->metadata.schema.row_size + 1);
             CORE_NEED(mospt_dataset_read_vertices(site.dataset, n, v, &err));
-            CORE_NEED(mospt_dataset_read_attributes(site.dataset, n, planes, &err));
+            CORE_NEED(mospt_dataset_read_attributes(site.dataset, n, v, planes, &err));
             for (uint32_t i = 0; i < h->nodes[n].count; i++)
                 values[count++] = rend_paint_value(paint, n, v, planes, i);
             free(v);
