@@ -1,6 +1,7 @@
 #include "preprocess/implied.h"
 
 #include "mospt/payload.h"
+#include "mospt/wide.h"
 
 #include <stddef.h>
 
@@ -31,7 +32,8 @@ static void begin(prep_implied *o, const mospt_schema *schema, const uint8_t *re
 }
 
 /* Bits in which some record differs from the first one, in the window that begins at `at`. */
-static window find_differences(const uint8_t *records, size_t stride, uint32_t count, size_t at)
+MOSPT_WIDE static window find_differences(const uint8_t *records, size_t stride, uint32_t count,
+                                          size_t at)
 {
     window first, w, differences = {0};
     memcpy(&first, records + at, WINDOW);
@@ -82,18 +84,27 @@ static uint64_t find_varying(uint64_t same, const mospt_schema *schema, const ui
     return varying;
 }
 
+/* The same for six bytes at the end of the window, from twice the bytes of the colour. */
+MOSPT_WIDE static window find_colour_differences(const uint8_t *records, size_t stride,
+                                                 uint32_t count, size_t at)
+{
+    window w, differences = {0};
+    for (uint32_t i = 0; i < count; i++, records += stride) {
+        window colour = {0};
+        memcpy(&colour, records + offsetof(mospt_vertex, r), 4);
+        memcpy(&w, records + at, WINDOW);
+        differences |= w ^ __builtin_shufflevector(colour, colour, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 0,
+                                                   0, 1, 1, 2, 2);
+    }
+    return differences;
+}
+
 static bool is_of_colour(const mospt_attribute *a, const uint8_t *records, size_t stride,
                          uint32_t count)
 {
-    uint32_t differences = 0;
-    for (uint32_t i = 0; i < count; i++, records += stride) {
-        const uint8_t *colour = records + offsetof(mospt_vertex, r);
-        uint16_t rgb[3];
-        memcpy(rgb, row_of(a, records), sizeof rgb);
-        for (int c = 0; c < 3; c++)
-            differences |= rgb[c] ^ colour[c] * 257u;
-    }
-    return differences == 0;
+    size_t end = sizeof(mospt_vertex) + a->offset + mospt_attribute_size(a);
+    window differences = find_colour_differences(records, stride, count, end - WINDOW);
+    return !differs(a, differences, end - WINDOW);
 }
 
 void prep_implied_look(prep_implied *o, const mospt_schema *schema, const uint8_t *records,
