@@ -67,6 +67,8 @@ static const struct {
      "most memory the build takes, 64M or more (default: a quarter of the machine)"},
     {"temp-dir", "FOLDER", 0, B | V | S | R, cli_read_temp_dir,
      "where scratch files go (default: beside the output)"},
+    {"compress-scratch", NULL, 0, B | V | S | R, cli_read_compress_scratch,
+     "compress scratch files: for a disk that is slower than the processor"},
     {"inner-depth", "N", 0, B | V | S | R, cli_read_depth,
      "levels of the octree inside each node, 1 to 9 (default: 6)"},
     {"columns", "NAMES", 0, B | V | S | R, cli_read_columns,

@@ -33,7 +33,7 @@ typedef struct {
     cli_command command;
     const char *const *paths; /* [path_count], borrowed from argv */
     size_t path_count;
-    bool help, json, stats, force, quiet, each, dedupe, legend, has_blend;
+    bool help, json, stats, force, quiet, each, dedupe, legend, has_blend, compress_scratch;
     const char *output, *temp_dir, *columns, *attributes, *screenshot, *poses, *crs;
     bool has_crop;
     double crop[6];                /* low x, y, z, high x, y, z */

@@ -47,6 +47,10 @@ bool cli_read_stats(cli_options *o, const char *v)
 {
     return (void)v, o->stats = true;
 }
+bool cli_read_compress_scratch(cli_options *o, const char *v)
+{
+    return (void)v, o->compress_scratch = true;
+}
 bool cli_read_force(cli_options *o, const char *v)
 {
     return (void)v, o->force = true;

@@ -8,8 +8,8 @@ typedef bool cli_reader(cli_options *o, const char *value);
 
 /* Input, output and the build. */
 cli_reader cli_read_output, cli_read_each, cli_read_force, cli_read_threads, cli_read_memory,
-    cli_read_temp_dir, cli_read_depth, cli_read_columns, cli_read_attributes, cli_read_poses,
-    cli_read_crop, cli_read_dedupe, cli_read_crs;
+    cli_read_temp_dir, cli_read_compress_scratch, cli_read_depth, cli_read_columns,
+    cli_read_attributes, cli_read_poses, cli_read_crop, cli_read_dedupe, cli_read_crs;
 
 /* How much is drawn, and how it looks. */
 cli_reader cli_read_budget, cli_read_min_node_size, cli_read_no_occlusion, cli_read_ram,

@@ -72,6 +72,7 @@ static prep_build_options build_options(const cli_options *o, const char *output
         .input_count = o->path_count,
         .output = output,
         .temp_dir = o->temp_dir,
+        .compress_scratch = o->compress_scratch,
         .force = o->force,
         .dedupe = o->dedupe,
         .attributes = o->attributes,

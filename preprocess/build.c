@@ -369,6 +369,7 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
               prep_store_create(b->scratch_folder, mospt_record_size(&b->metadata->schema),
                                 b->plan.block_size, b->plan.store_memory, &b->store, err) &&
               prep_arena_create(b->plan.solve_memory, &b->arena, err);
+    if (ok && b->options->compress_scratch) prep_store_compress(b->store);
     prep_pass_env env = {.shape = &b->shape,
                          .workers = b->workers,
                          .store = b->store,

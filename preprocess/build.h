@@ -25,6 +25,7 @@ typedef struct {
     size_t input_count;
     const char *output;      /* the dataset */
     const char *temp_dir;    /* for scratch files; NULL: beside the output */
+    bool compress_scratch;   /* of these, with LZ4 */
     bool force;              /* replace a dataset that is there */
     bool dedupe;             /* of several points at one position, keep only the first */
     uint32_t threads;        /* 0: one per processor */

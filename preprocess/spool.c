@@ -5,6 +5,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <lz4.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +15,9 @@
 /* Memory for blocks comes from the system in slabs of so many bytes, of which only what is touched
  * counts. */
 enum { SLAB_SIZE = 64 << 20, RECORDS_MIN_SHIFT = 4 };
+
+/* What a file system keeps a file in. */
+enum { DISK_UNIT = 4096 };
 
 typedef struct slab {
     struct slab *next;
@@ -25,17 +29,19 @@ struct prep_store {
     uint32_t block_shift; /* log2 of its records */
     char *folder;         /* owned */
     int fd;               /* of the scratch file, -1 before the first block goes there */
+    bool compresses;
 
     pthread_mutex_t lock;
     /* Under the lock: */
     size_t full_in_memory, full_limit; /* sealed blocks in memory, and how many may be */
     uint64_t *free_slots;              /* [free_count], owned */
     size_t free_count, free_capacity;
-    uint64_t slot_count;        /* the scratch file is so many blocks long */
-    slab *slabs;                /* owned */
-    uint8_t *fresh, *fresh_end; /* of the newest slab */
-    uint8_t *touched;           /* up to here all of that has been touched, or will be */
-    uint8_t *free_blocks;       /* each begins with a pointer to the next */
+    uint64_t slot_count; /* the scratch file is so many blocks long, which may have holes */
+    uint64_t in_use, in_use_peak; /* bytes of it */
+    slab *slabs;                  /* owned */
+    uint8_t *fresh, *fresh_end;   /* of the newest slab */
+    uint8_t *touched;             /* up to here all of that has been touched, or will be */
+    uint8_t *free_blocks;         /* each begins with a pointer to the next */
 };
 
 /* Memory of a block; the one that was given back last, which is the warmest, comes first. NULL:
@@ -129,9 +135,14 @@ void prep_store_destroy(prep_store *s)
     free(s);
 }
 
+void prep_store_compress(prep_store *store)
+{
+    store->compresses = true;
+}
+
 uint64_t prep_store_scratch_peak(const prep_store *store)
 {
-    return store->slot_count * store->block_size;
+    return store->in_use_peak;
 }
 
 uint32_t prep_store_block_shift(const prep_store *store)
@@ -161,25 +172,37 @@ static bool open_scratch(prep_store *s, mospt_err *err)
     return true;
 }
 
-static bool take_slot(prep_store *s, uint64_t *slot, mospt_err *err)
+/* What a slot with so many bytes takes of the disk. */
+static uint64_t disk_size(const prep_store *s, uint32_t stored)
+{
+    uint64_t size = ((uint64_t)stored + DISK_UNIT - 1) / DISK_UNIT * DISK_UNIT;
+    return s->compresses && size < s->block_size ? size : s->block_size;
+}
+
+static bool take_slot(prep_store *s, uint32_t stored, uint64_t *slot, mospt_err *err)
 {
     pthread_mutex_lock(&s->lock);
     bool ok = open_scratch(s, err);
-    if (ok) *slot = s->free_count > 0 ? s->free_slots[--s->free_count] : s->slot_count++;
+    if (ok) {
+        *slot = s->free_count > 0 ? s->free_slots[--s->free_count] : s->slot_count++;
+        s->in_use += disk_size(s, stored);
+        if (s->in_use > s->in_use_peak) s->in_use_peak = s->in_use;
+    }
     pthread_mutex_unlock(&s->lock);
     return ok;
 }
 
-static void free_slot(prep_store *s, uint64_t slot)
+static void free_slot(prep_store *s, const prep_block *block)
 {
     pthread_mutex_lock(&s->lock);
+    s->in_use -= disk_size(s, block->stored);
     if (s->free_count == s->free_capacity) {
         size_t capacity = s->free_capacity > 0 ? 2 * s->free_capacity : 256;
         uint64_t *slots = realloc(s->free_slots, capacity * sizeof *slots);
         if (slots != NULL) s->free_slots = slots, s->free_capacity = capacity;
     }
     /* Without memory for the list the slot is lost, and the file longer than it need be. */
-    if (s->free_count < s->free_capacity) s->free_slots[s->free_count++] = slot;
+    if (s->free_count < s->free_capacity) s->free_slots[s->free_count++] = block->slot;
     pthread_mutex_unlock(&s->lock);
 }
 
@@ -193,6 +216,28 @@ static bool may_stay(prep_store *s)
     return stays;
 }
 
+static size_t records_size(const prep_store *s, const prep_block *block)
+{
+    return block->count * s->record_size;
+}
+
+/* Writes a block to a slot of its own. Without memory to compress it in, it is written as it is. */
+static bool write_block(prep_store *s, prep_block *block, mospt_err *err)
+{
+    size_t size = records_size(s, block);
+    char *shorter = s->compresses ? malloc(size) : NULL;
+    int stored = shorter != NULL ? LZ4_compress_default((const char *)block->memory, shorter,
+                                                        (int)size, (int)size - 1)
+                                 : 0;
+    const void *from = stored > 0 ? (const void *)shorter : block->memory;
+    block->stored = stored > 0 ? (uint32_t)stored : (uint32_t)size;
+    bool ok = take_slot(s, block->stored, &block->slot, err) &&
+              mospt_file_write_at(s->fd, s->folder, block->slot * s->block_size, from,
+                                  block->stored, err);
+    free(shorter);
+    return ok;
+}
+
 /* Ends the filling of the last block. */
 static bool seal_last(prep_store *s, prep_spool *spool, mospt_err *err)
 {
@@ -201,9 +246,7 @@ static bool seal_last(prep_store *s, prep_spool *spool, mospt_err *err)
         (uint32_t)(spool->count - ((uint64_t)(spool->block_count - 1) << s->block_shift));
     spool->next = spool->end = NULL;
     if (may_stay(s)) return true;
-    bool ok = take_slot(s, &block->slot, err) &&
-              mospt_file_write_at(s->fd, s->folder, block->slot * s->block_size, block->memory,
-                                  block->count * s->record_size, err);
+    bool ok = write_block(s, block, err);
     if (!ok) spool->count -= block->count, block->count = 0;
     give_memory(s, block->memory);
     block->memory = NULL;
@@ -244,15 +287,24 @@ static void release(prep_store *s, prep_block *block, bool sealed)
             pthread_mutex_unlock(&s->lock);
         }
     } else if (block->count > 0) {
-        free_slot(s, block->slot);
+        free_slot(s, block);
     }
     block->count = 0;
 }
 
 static bool read_block(const prep_store *s, const prep_block *block, uint8_t *out, mospt_err *err)
 {
-    return mospt_file_read_at(s->fd, s->folder, block->slot * s->block_size, out,
-                              block->count * s->record_size, err);
+    size_t size = records_size(s, block);
+    uint64_t offset = block->slot * s->block_size;
+    if (block->stored == size) return mospt_file_read_at(s->fd, s->folder, offset, out, size, err);
+    char *shorter = malloc(block->stored);
+    if (shorter == NULL) return mospt_err_nomem(err, block->stored);
+    bool ok = mospt_file_read_at(s->fd, s->folder, offset, shorter, block->stored, err);
+    if (ok && LZ4_decompress_safe(shorter, (char *)out, (int)block->stored, (int)size) != (int)size)
+        ok = mospt_err_set(err, MOSPT_EIO, mospt_at_byte(s->folder, offset),
+                           "the scratch file there does not hold what was written");
+    free(shorter);
+    return ok;
 }
 
 size_t prep_spool_size_on_disk(const prep_store *s, const prep_spool *spool)
@@ -275,15 +327,12 @@ static size_t room(prep_store *s)
 bool prep_spool_make_room(prep_store *s, prep_spool *spool, size_t size, mospt_err *err)
 {
     for (uint32_t i = 0; i < spool->block_count && room(s) * s->block_size < size; i++) {
-        prep_block *block = &spool->blocks[i];
-        uint64_t slot;
+        prep_block *block = &spool->blocks[i], written = *block;
         if (block->memory == NULL || block->count >> s->block_shift == 0) continue;
-        if (!take_slot(s, &slot, err) ||
-            !mospt_file_write_at(s->fd, s->folder, slot * s->block_size, block->memory,
-                                 s->block_size, err))
-            return false;
+        if (!write_block(s, &written, err)) return false;
+        written.memory = NULL;
         release(s, block, true);
-        *block = (prep_block){.slot = slot, .count = 1u << s->block_shift};
+        *block = written;
     }
     return true;
 }

@@ -13,6 +13,7 @@ typedef struct prep_store prep_store;
 typedef struct {
     uint8_t *memory; /* of the store; NULL: the block is on the disk */
     uint64_t slot;   /* of the scratch file, if it is */
+    uint32_t stored; /* bytes there; fewer than those of its records: they are compressed */
     uint32_t count;  /* records; 0: taken */
 } prep_block;
 
@@ -32,6 +33,10 @@ typedef struct {
 bool prep_store_create(const char *folder, size_t record_size, size_t block_size,
                        size_t memory_size, prep_store **out, mospt_err *err);
 void prep_store_destroy(prep_store *store);
+
+/* From now on, blocks are compressed before they go to the disk (LZ4), where that makes them
+ * shorter: for a disk that is slower than the processor. */
+void prep_store_compress(prep_store *store);
 
 /* Most bytes of the scratch file that were in use at a time. */
 uint64_t prep_store_scratch_peak(const prep_store *store);

@@ -417,7 +417,8 @@ static void memory_and_threads_do_not_show_in_the_bytes(void **state)
     static const struct {
         uint64_t mebibytes;
         uint32_t threads;
-    } ways[] = {{64, 1}, {64, 7}, {80, 2}, {2048, 7}};
+        bool compress_scratch;
+    } ways[] = {{64, 1, false}, {64, 7, false}, {80, 2, false}, {2048, 7, false}, {64, 2, true}};
     char *first = core_path(folder, "first.ipts");
     (void)state;
     make_raw(LARGE, 2000000, 6);
@@ -429,7 +430,9 @@ static void memory_and_threads_do_not_show_in_the_bytes(void **state)
     prep_build_result_fini(&result);
     for (size_t k = 0; k < sizeof ways / sizeof ways[0]; k++) {
         mospt_err err = {0};
-        o = (prep_build_options){.memory = ways[k].mebibytes << 20, .threads = ways[k].threads};
+        o = (prep_build_options){.memory = ways[k].mebibytes << 20,
+                                 .threads = ways[k].threads,
+                                 .compress_scratch = ways[k].compress_scratch};
         CORE_NEED(build_with(&o, &result, &err));
         prep_build_result_fini(&result);
         core_assert_same_folders(first, output);

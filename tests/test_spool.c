@@ -237,6 +237,38 @@ static void full_blocks_make_room_for_what_is_needed_sooner(void **state)
     prep_store_destroy(store);
 }
 
+/* Half of the records of a run are like each other, all of a noise are not. */
+static void compressed_blocks_come_back_and_take_less_room(void **state)
+{
+    enum { SIZE = 1 << 16, COUNT = 10 * SIZE / RECORD + 3 };
+    (void)state;
+    for (uint32_t alike = 0; alike <= 2; alike++) {
+        prep_store *store = NULL;
+        prep_spool spool = {0};
+        mospt_err err = {0};
+        uint8_t *out = malloc(COUNT * RECORD), record[RECORD], expected[RECORD];
+        assert_non_null(out);
+        CORE_NEED(prep_store_create(folder, RECORD, SIZE, 0, &store, &err));
+        prep_store_compress(store);
+        for (uint32_t i = 0; i < COUNT; i++) {
+            make_record(7, alike == 2 || (alike == 1 && i % 2) ? 0 : i, record);
+            CORE_NEED(prep_spool_append(store, &spool, record, RECORD, &err));
+        }
+        CORE_NEED(prep_spool_seal(store, &spool, &err));
+        uint64_t raw = spool.block_count * (uint64_t)prep_store_block_size(store),
+                 peak = prep_store_scratch_peak(store);
+        if (alike == 0) assert_true(peak > raw - SIZE && peak <= raw);
+        else assert_true(peak < raw * (3 - alike) / 3 + spool.block_count * 4096);
+        CORE_NEED(prep_spool_take(store, &spool, out, &err));
+        for (uint32_t i = 0; i < COUNT; i++) {
+            make_record(7, alike == 2 || (alike == 1 && i % 2) ? 0 : i, expected);
+            assert_memory_equal(out + i * RECORD, expected, RECORD);
+        }
+        free(out);
+        prep_store_destroy(store);
+    }
+}
+
 static void the_scratch_file_has_no_name(void **state)
 {
     (void)state;
@@ -342,6 +374,7 @@ int main(void)
         cmocka_unit_test(scratch_space_is_used_again),
         cmocka_unit_test(memory_is_used_before_the_disk_and_given_back),
         cmocka_unit_test(full_blocks_make_room_for_what_is_needed_sooner),
+        cmocka_unit_test(compressed_blocks_come_back_and_take_less_room),
         cmocka_unit_test(the_scratch_file_has_no_name),
         cmocka_unit_test(a_full_disk_is_an_error_and_leaves_the_spool_usable),
         cmocka_unit_test(a_folder_that_cannot_be_written_to_is_an_error),
