@@ -221,20 +221,33 @@ static size_t records_size(const prep_store *s, const prep_block *block)
     return block->count * s->record_size;
 }
 
-/* Writes a block to a slot of its own. Without memory to compress it in, it is written as it is. */
+/* Columns of bytes out of rows; with `height` and `width` exchanged, rows out of columns. */
+static void turn(const uint8_t *from, size_t height, size_t width, uint8_t *to)
+{
+    for (size_t c = 0; c < width; c++)
+        for (size_t r = 0; r < height; r++)
+            to[c * height + r] = from[r * width + c];
+}
+
+/* Writes a block to a slot of its own. Compressed, it is byte after byte of all records, most of
+ * which are like those before them. Without memory for that, it is written as it is. */
 static bool write_block(prep_store *s, prep_block *block, mospt_err *err)
 {
     size_t size = records_size(s, block);
-    char *shorter = s->compresses ? malloc(size) : NULL;
-    int stored = shorter != NULL ? LZ4_compress_default((const char *)block->memory, shorter,
-                                                        (int)size, (int)size - 1)
-                                 : 0;
-    const void *from = stored > 0 ? (const void *)shorter : block->memory;
+    uint8_t *columns = s->compresses ? malloc(2 * size) : NULL, *shorter = columns;
+    int stored = 0;
+    if (columns != NULL) {
+        shorter += size;
+        turn(block->memory, block->count, s->record_size, columns);
+        stored =
+            LZ4_compress_default((const char *)columns, (char *)shorter, (int)size, (int)size - 1);
+    }
+    const uint8_t *from = stored > 0 ? shorter : block->memory;
     block->stored = stored > 0 ? (uint32_t)stored : (uint32_t)size;
     bool ok = take_slot(s, block->stored, &block->slot, err) &&
               mospt_file_write_at(s->fd, s->folder, block->slot * s->block_size, from,
                                   block->stored, err);
-    free(shorter);
+    free(columns);
     return ok;
 }
 
@@ -297,13 +310,16 @@ static bool read_block(const prep_store *s, const prep_block *block, uint8_t *ou
     size_t size = records_size(s, block);
     uint64_t offset = block->slot * s->block_size;
     if (block->stored == size) return mospt_file_read_at(s->fd, s->folder, offset, out, size, err);
-    char *shorter = malloc(block->stored);
-    if (shorter == NULL) return mospt_err_nomem(err, block->stored);
+    uint8_t *columns = malloc(size + block->stored), *shorter = columns;
+    if (columns == NULL) return mospt_err_nomem(err, size + block->stored);
+    shorter += size;
     bool ok = mospt_file_read_at(s->fd, s->folder, offset, shorter, block->stored, err);
-    if (ok && LZ4_decompress_safe(shorter, (char *)out, (int)block->stored, (int)size) != (int)size)
+    if (ok && LZ4_decompress_safe((const char *)shorter, (char *)columns, (int)block->stored,
+                                  (int)size) != (int)size)
         ok = mospt_err_set(err, MOSPT_EIO, mospt_at_byte(s->folder, offset),
                            "the scratch file there does not hold what was written");
-    free(shorter);
+    if (ok) turn(columns, s->record_size, block->count, out);
+    free(columns);
     return ok;
 }
 

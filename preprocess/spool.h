@@ -34,8 +34,8 @@ bool prep_store_create(const char *folder, size_t record_size, size_t block_size
                        size_t memory_size, prep_store **out, mospt_err *err);
 void prep_store_destroy(prep_store *store);
 
-/* From now on, blocks are compressed before they go to the disk (LZ4), where that makes them
- * shorter: for a disk that is slower than the processor. */
+/* From now on, blocks are compressed before they go to the disk (LZ4, column by column), where that
+ * makes them shorter: for a disk that is slower than the processor. */
 void prep_store_compress(prep_store *store);
 
 /* Most bytes of the scratch file that were in use at a time. */
