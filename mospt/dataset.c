@@ -165,10 +165,9 @@ bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node,
                                    const mospt_vertex *vertices, uint8_t *out, mospt_err *err)
 {
     const mospt_node *n = &dataset->hierarchy.nodes[node];
-    const mospt_schema *schema = &dataset->metadata.schema;
     if (!read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,
                    mospt_dataset_planes_size(dataset, node), n->attributes_hash, "attributes", err))
         return false;
-    mospt_payload_complete(schema, vertices, n->count, out);
+    mospt_payload_complete(&dataset->metadata.schema, vertices, n->count, out);
     return true;
 }

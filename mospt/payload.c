@@ -103,13 +103,11 @@ static void pack_planes(const mospt_schema *schema, uint8_t *planes, uint32_t co
 {
     uint8_t columns[WINDOW][BLOCK];
     size_t stride = mospt_record_size(schema), begin = stride; /* of the columns; none yet */
-    size_t before = 0; /* bytes of a point in the planes before */
     for (uint32_t k = 0; k < schema->count; k++) {
         const mospt_attribute *a = &schema->at[k];
         size_t size = mospt_attribute_size(a), offset = sizeof(mospt_vertex) + a->offset;
-        uint8_t *to = planes + count * before + start * size;
+        uint8_t *to = planes + (size_t)count * a->stored_offset + start * size;
         if (a->storage != MOSPT_IN_PLANE) continue;
-        before += size;
         if (size > 2) {
             gather(to, from, offset, size, n);
             continue;
@@ -199,7 +197,6 @@ static void fill_of_colour(const mospt_vertex *vertices, uint32_t count, uint8_t
 void mospt_payload_complete(const mospt_schema *schema, const mospt_vertex *vertices,
                             uint32_t count, uint8_t *planes)
 {
-    size_t stored = schema->stored_size; /* bytes of a point in the planes up to this one */
     for (uint32_t k = schema->count; k-- > 0;) {
         const mospt_attribute *a = &schema->at[k];
         uint8_t *plane = planes + (size_t)count * a->offset;
@@ -211,8 +208,8 @@ void mospt_payload_complete(const mospt_schema *schema, const mospt_vertex *vert
             fill_of_colour(vertices, count, plane);
             break;
         default: /* those before it stand in front of both places */
-            stored -= mospt_attribute_size(a);
-            memmove(plane, planes + count * stored, count * mospt_attribute_size(a));
+            memmove(plane, planes + (size_t)count * a->stored_offset,
+                    count * mospt_attribute_size(a));
         }
     }
 }

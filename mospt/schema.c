@@ -167,6 +167,7 @@ static void lay_out(mospt_schema *schema)
         mospt_attribute *a = &schema->at[i];
         uint32_t size = (uint32_t)mospt_attribute_size(a);
         a->offset = schema->row_size;
+        a->stored_offset = schema->stored_size;
         schema->row_size += size;
         schema->stored_size += a->storage == MOSPT_IN_PLANE ? size : 0;
     }

@@ -34,7 +34,6 @@ typedef enum {
     MOSPT_CONSTANT,  /* not at all: all points have the same */
     MOSPT_OF_COLOUR, /* not at all: three u16, of which each is its display colour times 257, so
                         that both bytes are that */
-    MOSPT_STORAGE_COUNT,
 } mospt_storage;
 
 typedef struct {
@@ -43,6 +42,7 @@ typedef struct {
     uint32_t components; /* 1 to 255 values of `type` per point */
     uint32_t offset;     /* bytes from the start of a row; rows are packed, nothing is aligned */
     mospt_storage storage;
+    uint32_t stored_offset; /* with MOSPT_IN_PLANE: bytes of a point in the planes before it */
     uint8_t constant[MOSPT_CONSTANT_SIZE_MAX]; /* with MOSPT_CONSTANT: as in a row */
 } mospt_attribute;
 

@@ -112,6 +112,15 @@ static bool take_memory(const prep_pass_env *env, item *i)
     return i->memory != NULL;
 }
 
+/* The same for a part that comes alone: it may be larger than the arena, and better too much memory
+ * than none. */
+static bool take_memory_anyhow(const prep_pass_env *env, item *i, mospt_err *err)
+{
+    if (take_memory(env, i)) return true;
+    i->on_heap = true;
+    return take_memory(env, i) || mospt_err_nomem(err, (size_t)i->count);
+}
+
 /* Gives back all that a part holds. */
 static void fini_item(const prep_pass_env *env, item *i)
 {
@@ -243,14 +252,9 @@ static item *next_to_solve(line *l)
 {
     if (l->next_to_solve == l->item_count) return NULL;
     item *i = &l->items[l->next_to_solve];
-    bool taken = take_memory(l->env, i);
-    if (!taken && l->in_flight == 0) {
-        /* One node may be larger than the arena: better too much memory than none. */
-        i->on_heap = true;
-        taken = take_memory(l->env, i);
-        l->failed = !taken;
-        if (!taken) mospt_err_nomem(&l->err, (size_t)i->count);
-    }
+    bool alone = l->in_flight == 0,
+         taken = alone ? take_memory_anyhow(l->env, i, &l->err) : take_memory(l->env, i);
+    l->failed = l->failed || (alone && !taken);
     if (!taken) return NULL;
     l->in_flight++;
     l->next_to_solve++;
@@ -357,11 +361,7 @@ static bool finish_shared(const prep_pass_env *env, const prep_finish_part *part
     item i = {.part = part, .count = count_of(part), .kept = MOSPT_NO_NODE};
     uint32_t count = (uint32_t)i.count;
     prep_solving *solving = NULL;
-    if (!take_memory(env, &i)) {
-        /* Better too much memory than none. */
-        i.on_heap = true;
-        if (!take_memory(env, &i)) return mospt_err_nomem(err, (size_t)i.count);
-    }
+    if (!take_memory_anyhow(env, &i, err)) return false;
     bool ok = check_kept(env, &i, err) &&
               collect_records(env, &i, (uint8_t *)i.memory + prep_solve_work_size(count), err) &&
               prep_solving_begin(env->shape, env->workers, part->corner, part->level, &i.records,

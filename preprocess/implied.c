@@ -139,8 +139,7 @@ void prep_implied_add(prep_implied *o, const mospt_schema *schema, const prep_im
 
 void prep_implied_apply(const prep_implied *o, mospt_schema *schema)
 {
-    for (uint32_t k = 0; k < schema->count; k++) {
-        if (!o->has_points) return;
+    for (uint32_t k = 0; o->has_points && k < schema->count; k++) {
         if (!has(o->varies, k)) mospt_schema_keep(schema, k, MOSPT_CONSTANT, o->value[k]);
         else if (!has(o->off_colour, k)) mospt_schema_keep(schema, k, MOSPT_OF_COLOUR, NULL);
     }

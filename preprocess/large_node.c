@@ -185,16 +185,16 @@ static bool write_run(large *l, const cell *c, const uint8_t *payload, uint32_t 
                       uint32_t to, mospt_err *err)
 {
     const mospt_schema *schema = l->env->shape->schema;
-    size_t of_cell = c->spool.count, of_node = l->node.count, before = 0;
+    size_t of_cell = c->spool.count, of_node = l->node.count;
     for (uint32_t k = 0; k <= schema->count; k++) {
         const mospt_attribute *a = k > 0 ? &schema->at[k - 1] : NULL;
-        size_t size = a != NULL ? mospt_attribute_size(a) : sizeof(mospt_vertex);
+        size_t size = a != NULL ? mospt_attribute_size(a) : sizeof(mospt_vertex),
+               before = a != NULL ? sizeof(mospt_vertex) + a->stored_offset : 0;
         if (a != NULL && a->storage != MOSPT_IN_PLANE) continue;
         if (!mospt_writer_write_part(l->env->writer, &l->node, before * of_node + to * size,
                                      payload + before * of_cell + begin * size,
                                      (end - begin) * size, err))
             return false;
-        before += size;
     }
     return true;
 }
