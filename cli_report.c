@@ -30,11 +30,15 @@ void cli_report_losses(const prep_build_result *r)
     fprintf(stderr, "%s\n", r->files.unknown_count > UNKNOWN_SHOWN ? ", ..." : "");
 }
 
-void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes)
+void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes,
+                             bool again)
 {
     char number[32], output[32], scratch[32];
     cli_bytes_text(output_bytes, output);
     cli_bytes_text(scratch_bytes, scratch);
+    if (again)
+        fprintf(stderr,
+                "They have less in common than the first of them, and are read once more.\n");
     fprintf(stderr, "%s points: the dataset takes %s", cli_grouped(points, number), output);
     if (scratch_bytes > 0) fprintf(stderr, ", and up to %s of scratch space", scratch);
     fprintf(stderr, "\n");

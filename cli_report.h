@@ -10,7 +10,8 @@
 void cli_report_losses(const prep_build_result *result);
 
 /* What a build will take, before it starts. */
-void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes);
+void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes,
+                             bool again);
 
 void cli_report_build(FILE *out, const char *output, const prep_build_result *result);
 void cli_report_build_json(FILE *out, const char *output, const prep_build_result *result);

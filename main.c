@@ -58,10 +58,10 @@ static bool on_build_progress(void *context, const prep_progress *now)
 }
 
 static void on_build_announce(void *context, uint64_t points, uint64_t scratch_bytes,
-                              uint64_t output_bytes)
+                              uint64_t output_bytes, bool again)
 {
     const cli_progress *progress = context;
-    if (!progress->quiet) cli_report_announcement(points, scratch_bytes, output_bytes);
+    if (!progress->quiet) cli_report_announcement(points, scratch_bytes, output_bytes, again);
 }
 
 static prep_build_options build_options(const cli_options *o, const char *output,

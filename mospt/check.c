@@ -161,8 +161,10 @@ static void check_node(checker *c, uint32_t node)
     mospt_err err;
     bool whole = true;
     if (!mospt_dataset_read_vertices(d, node, v, &err)) report(c, &err), whole = false;
-    if (!mospt_dataset_read_attributes(d, node, v, planes, &err)) report(c, &err), whole = false;
+    if (!mospt_dataset_read_planes(d, node, planes, &err)) report(c, &err), whole = false;
     if (!whole) return;
+    c->points_hash += mospt_payload_points_hash(&d->metadata.schema, c->payload, planes, n->count);
+    mospt_payload_complete(&d->metadata.schema, v, n->count, planes);
     for (uint32_t i = 0; i < n->count; i++) {
         const uint32_t g[3] = {v[i].x, v[i].y, v[i].z};
         c->codes[i] = (uint32_t)mospt_cell_code(g[0], g[1], g[2], bits, d->hierarchy.inner_depth);
@@ -175,7 +177,6 @@ static void check_node(checker *c, uint32_t node)
     check_levels(c, node);
     check_strategy(c, node);
     check_attributes(c, node, planes);
-    c->points_hash += mospt_payload_points_hash(&d->metadata.schema, c->payload, planes, n->count);
     c->result->points += n->count;
     c->result->bytes += n->payload_size;
 }
@@ -302,7 +303,7 @@ bool mospt_check(const mospt_dataset *d, const mospt_check_options *options,
                  .low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
     for (uint32_t i = 0; i < d->hierarchy.count; i++)
         if (d->hierarchy.nodes[i].count > largest) largest = d->hierarchy.nodes[i].count;
-    size_t payload_size = largest * mospt_record_size(&d->metadata.schema);
+    size_t payload_size = largest * (sizeof(mospt_vertex) + d->metadata.schema.row_size);
     c.payload = malloc(payload_size);
     c.codes = malloc(largest * sizeof *c.codes);
     c.cells = calloc(1, ((size_t)1 << cell_bits) / 8 + 1);

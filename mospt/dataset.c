@@ -161,13 +161,19 @@ bool mospt_dataset_read_vertices(const mospt_dataset *dataset, uint32_t node, mo
                      dataset->hierarchy.nodes[node].vertices_hash, "vertices", err);
 }
 
+bool mospt_dataset_read_planes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
+                               mospt_err *err)
+{
+    return read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,
+                     mospt_dataset_planes_size(dataset, node),
+                     dataset->hierarchy.nodes[node].attributes_hash, "attributes", err);
+}
+
 bool mospt_dataset_read_attributes(const mospt_dataset *dataset, uint32_t node,
                                    const mospt_vertex *vertices, uint8_t *out, mospt_err *err)
 {
-    const mospt_node *n = &dataset->hierarchy.nodes[node];
-    if (!read_part(dataset, node, mospt_dataset_vertices_size(dataset, node), out,
-                   mospt_dataset_planes_size(dataset, node), n->attributes_hash, "attributes", err))
-        return false;
-    mospt_payload_complete(&dataset->metadata.schema, vertices, n->count, out);
+    if (!mospt_dataset_read_planes(dataset, node, out, err)) return false;
+    mospt_payload_complete(&dataset->metadata.schema, vertices,
+                           dataset->hierarchy.nodes[node].count, out);
     return true;
 }

@@ -8,8 +8,10 @@
 #include "mospt/point.h"
 #include "mospt/schema.h"
 
-/* Of the format, as docs/format.md has it; what has the one before is read, too. */
-enum { MOSPT_DATASET_VERSION = 3 };
+enum {
+    MOSPT_DATASET_VERSION = 4,     /* of the format, as docs/format.md has it */
+    MOSPT_DATASET_VERSION_OLD = 2, /* is read, too */
+};
 
 typedef struct {
     char *name;           /* owned, relative to the folder that was built from */
@@ -109,7 +111,12 @@ static inline size_t mospt_dataset_planes_size(const mospt_dataset *dataset, uin
            mospt_dataset_vertices_size(dataset, node);
 }
 
-/* Reads all attributes of one node and checks the hash of the planes.
+/* Reads the attributes of one node that are stored and checks their hash.
+ * out      [mospt_dataset_planes_size()] bytes: plane after plane */
+bool mospt_dataset_read_planes(const mospt_dataset *dataset, uint32_t node, uint8_t *out,
+                               mospt_err *err);
+
+/* The same, and those that are not stored.
  * vertices [nodes[node].count], as they were read: some attributes are the colour
  * out      [nodes[node].count * schema.row_size] bytes: plane after plane, in the order of the
  *          schema, also of what is not stored

@@ -371,10 +371,10 @@ static void metadata_from_json(parse *p, json_t *json, mospt_metadata *m)
         return;
     }
     json_int_t version = json_integer_value(json_object_get(json, "version"));
-    if (version != MOSPT_DATASET_VERSION && version != MOSPT_DATASET_VERSION - 1) {
+    if (version != MOSPT_DATASET_VERSION && version != MOSPT_DATASET_VERSION_OLD) {
         p->ok = mospt_err_set(p->err, MOSPT_EFORMAT, mospt_at_file(p->path),
                               "has version %lld, this program reads versions %d and %d",
-                              (long long)version, MOSPT_DATASET_VERSION - 1, MOSPT_DATASET_VERSION);
+                              (long long)version, MOSPT_DATASET_VERSION_OLD, MOSPT_DATASET_VERSION);
         return;
     }
     json_t *bounds = get(p, json, "bounds"), *hierarchy = get(p, json, "hierarchy");

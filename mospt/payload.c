@@ -1,6 +1,7 @@
 #include "mospt/payload.h"
 
 #include "mospt/hash.h"
+#include "mospt/turn.h"
 
 /* Points whose records are packed plane by plane while they are still in the first cache. */
 enum { BLOCK = 256 };
@@ -56,34 +57,18 @@ static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_
 #undef COPY
 }
 
-/* Bytes of records that are turned into columns together. */
-enum { WINDOW = 16 };
-typedef uint8_t window __attribute__((vector_size(WINDOW)));
-
-/* One of four steps that turn rows into columns: rows that are eight apart are put into each other.
- */
-static inline void interleave(const window *from, window *to)
-{
-    for (int i = 0; i < WINDOW / 2; i++) {
-        to[2 * i] = __builtin_shufflevector(from[i], from[i + 8], 0, 16, 1, 17, 2, 18, 3, 19, 4, 20,
-                                            5, 21, 6, 22, 7, 23);
-        to[2 * i + 1] = __builtin_shufflevector(from[i], from[i + 8], 8, 24, 9, 25, 10, 26, 11, 27,
-                                                12, 28, 13, 29, 14, 30, 15, 31);
-    }
-}
-
 /* from     [count] records, at most BLOCK
- * columns  out, of WINDOW bytes of each from `offset` on */
+ * columns  out, of MOSPT_TURN bytes of each from `offset` on */
 static void turn(const uint8_t *const *from, size_t offset, uint32_t count,
-                 uint8_t columns[WINDOW][BLOCK])
+                 uint8_t columns[MOSPT_TURN][BLOCK])
 {
-    window a[WINDOW], b[WINDOW];
-    for (uint32_t start = 0; start < count; start += WINDOW) {
-        for (uint32_t i = 0; i < WINDOW; i++) /* what is behind the last one does not matter */
-            memcpy(&a[i], from[start + i < count ? start + i : start] + offset, WINDOW);
-        interleave(a, b), interleave(b, a), interleave(a, b), interleave(b, a);
-        for (uint32_t i = 0; i < WINDOW; i++)
-            memcpy(columns[i] + start, &a[i], WINDOW);
+    mospt_row rows[MOSPT_TURN];
+    for (uint32_t start = 0; start < count; start += MOSPT_TURN) {
+        for (uint32_t i = 0; i < MOSPT_TURN; i++) /* what is behind the last one does not matter */
+            memcpy(&rows[i], from[start + i < count ? start + i : start] + offset, MOSPT_TURN);
+        mospt_turn(rows);
+        for (uint32_t i = 0; i < MOSPT_TURN; i++)
+            memcpy(columns[i] + start, &rows[i], MOSPT_TURN);
     }
 }
 
@@ -101,19 +86,19 @@ static void join_columns(uint8_t *restrict to, const uint8_t *restrict first,
 static void pack_planes(const mospt_schema *schema, uint8_t *planes, uint32_t count, uint32_t start,
                         const uint8_t *const *from, uint32_t n)
 {
-    uint8_t columns[WINDOW][BLOCK];
+    uint8_t columns[MOSPT_TURN][BLOCK];
     size_t stride = mospt_record_size(schema), begin = stride; /* of the columns; none yet */
     for (uint32_t k = 0; k < schema->count; k++) {
         const mospt_attribute *a = &schema->at[k];
-        size_t size = mospt_attribute_size(a), offset = sizeof(mospt_vertex) + a->offset;
+        size_t size = mospt_attribute_size(a), offset = sizeof(mospt_vertex) + a->stored_offset;
         uint8_t *to = planes + (size_t)count * a->stored_offset + start * size;
         if (a->storage != MOSPT_IN_PLANE) continue;
         if (size > 2) {
             gather(to, from, offset, size, n);
             continue;
         }
-        if (offset < begin || offset + size > begin + WINDOW) {
-            begin = offset + WINDOW <= stride ? offset : stride - WINDOW;
+        if (offset < begin || offset + size > begin + MOSPT_TURN) {
+            begin = offset + MOSPT_TURN <= stride ? offset : stride - MOSPT_TURN;
             turn(from, begin, n, columns);
         }
         if (size == 1) memcpy(to, columns[offset - begin], n);
@@ -136,8 +121,9 @@ static uint64_t hash_block(const mospt_schema *schema, const uint8_t *vertices,
         for (uint32_t k = 0; k < schema->count; k++) {
             const mospt_attribute *a = &schema->at[k];
             size_t size = mospt_attribute_size(a);
-            copy_strided(records + sizeof(mospt_vertex) + a->offset, stride,
-                         planes + (size_t)count * a->offset + start * size, size, size, n);
+            if (a->storage != MOSPT_IN_PLANE) continue;
+            copy_strided(records + sizeof(mospt_vertex) + a->stored_offset, stride,
+                         planes + (size_t)count * a->stored_offset + start * size, size, size, n);
         }
         sum += mospt_hash_records(records, stride, n);
     }

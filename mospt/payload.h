@@ -5,21 +5,22 @@
 #include "mospt/point.h"
 #include "mospt/schema.h"
 
-/* Bytes of one point with all its attributes: what a record has. */
+/* Bytes of the record of a point, which is on its way to a payload: its vertex, and of its
+ * attributes those that are kept in planes. */
 static inline size_t mospt_record_size(const mospt_schema *schema)
 {
-    return sizeof(mospt_vertex) + schema->row_size;
+    return sizeof(mospt_vertex) + schema->stored_size;
 }
 
-/* Bytes of a payload of `count` points: at most as many as their records have. */
+/* Bytes of a payload of `count` points. */
 static inline uint64_t mospt_payload_size(const mospt_schema *schema, uint64_t count)
 {
-    return count * (sizeof(mospt_vertex) + schema->stored_size);
+    return count * mospt_record_size(schema);
 }
 
 /* Packs the records order[0..count-1] of `records` into `out`, and sets the size and the hashes of
  * `node`.
- * records  vertex and row of each point, mospt_record_size() bytes
+ * records  [mospt_record_size()] of each point
  * out      [mospt_payload_size()]
  * returns  the sum of the hashes of the records that were taken, in their new order: what
  *          mospt_payload_points_hash() is of the payload */
@@ -33,6 +34,6 @@ void mospt_payload_complete(const mospt_schema *schema, const mospt_vertex *vert
                             uint32_t count, uint8_t *planes);
 
 /* Sum of the hashes of the points in a payload, each as mospt_hash_records() sees its record.
- * vertices [count], planes [count * row_size] bytes, of all attributes */
+ * vertices [count], planes [count * stored_size] bytes */
 uint64_t mospt_payload_points_hash(const mospt_schema *schema, const uint8_t *vertices,
                                    const uint8_t *planes, uint32_t count);

@@ -40,12 +40,9 @@ void prep_batch_fini(prep_batch *batch)
 prep_places prep_batch_places(const prep_batch *batch)
 {
     size_t first = batch->count;
-    prep_places places = {
-        .xyz = batch->xyz + 3 * first, .rgbi = batch->rgbi + 4 * first, .rgbi_stride = 4};
-    for (uint32_t k = 0; k < batch->plane_count; k++) {
+    prep_places places = {.xyz = batch->xyz + 3 * first, .rgbi = batch->rgbi + 4 * first};
+    for (uint32_t k = 0; k < batch->plane_count; k++)
         places.plane[k] = batch->plane[k] + first * batch->plane_size[k];
-        places.plane_stride[k] = batch->plane_size[k];
-    }
     return places;
 }
 

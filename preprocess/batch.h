@@ -4,13 +4,11 @@
 
 enum { PREP_BATCH_CAPACITY = 65536 };
 
-/* Where points are written: what belongs to point i stands i strides further on. */
+/* Where points are written, in planes as those of a batch. */
 typedef struct {
-    double *xyz;   /* [count][3], metres, world coordinates; NULL: not wanted */
-    uint8_t *rgbi; /* 4 bytes a point */
-    size_t rgbi_stride;
+    double *xyz; /* [count][3]; NULL: not wanted */
+    uint8_t *rgbi;
     uint8_t *plane[MOSPT_ATTRIBUTES_MAX]; /* one per attribute of the scan; NULL: not wanted */
-    size_t plane_stride[MOSPT_ATTRIBUTES_MAX];
 } prep_places;
 
 /* Takes `count` records of a file apart.

@@ -1,6 +1,7 @@
 #include "preprocess/build.h"
 
 #include "mospt/file.h"
+#include "preprocess/attributes.h"
 #include "preprocess/dedupe.h"
 #include "preprocess/feed.h"
 #include "preprocess/finish.h"
@@ -25,15 +26,16 @@ typedef struct {
     const prep_build_options *options;
     prep_build_result *result;
     prep_workers *workers;
+    uint64_t memory; /* bytes, the peak of the process */
     prep_plan plan;
+    bool bypasses_cache;
     prep_shape shape;
     mospt_metadata *metadata; /* of the result */
     prep_store *store;
     prep_arena *arena;
     mospt_writer *writer;
-    prep_implied implied; /* by all points */
-    uint64_t identity;    /* of this build, see prep_provenance_hash() */
-    prep_resume *resume;  /* what an interrupted one has left; NULL: nothing */
+    uint64_t identity;   /* of this build, see prep_provenance_hash() */
+    prep_resume *resume; /* what an interrupted one has left; NULL: nothing */
     prep_phase phase;
     uint64_t points_total; /* 0: unknown */
     double phase_start;
@@ -98,67 +100,6 @@ static bool choose_scratch(build *b, mospt_err *err)
     return mospt_err_set(err, MOSPT_EIO, mospt_at_file(b->scratch_folder), "cannot be written to");
 }
 
-/* True if a list of names, separated by commas, has this one. */
-static bool list_has(const char *list, const char *name)
-{
-    size_t length = strlen(name);
-    for (const char *at = list; at != NULL; at = strchr(at, ',')) {
-        at += *at == ',';
-        if (strncmp(at, name, length) == 0 && (at[length] == ',' || at[length] == '\0'))
-            return true;
-    }
-    return false;
-}
-
-static bool some_scan_has(const prep_source *source, const char *name)
-{
-    for (uint32_t i = 0; i < source->scan_count; i++)
-        if (mospt_schema_find(&source->scans[i].info.attributes, name) >= 0) return true;
-    return false;
-}
-
-/* A name that is in the list and in no scan is a slip of the pen. */
-static bool check_wanted(const build *b, mospt_err *err)
-{
-    const char *at = b->options->attributes;
-    while (at != NULL && strcmp(at, "none") != 0) {
-        char name[MOSPT_ATTRIBUTE_NAME_MAX];
-        size_t length = strcspn(at, ",");
-        snprintf(name, sizeof name, "%.*s", (int)length, at);
-        if (strcmp(name, "scan") != 0 && !some_scan_has(&b->result->source, name))
-            return mospt_err_set(err, MOSPT_EINVAL, mospt_nowhere(),
-                                 "no scan has an attribute \"%.*s\"; `instantpoints info SCAN` "
-                                 "lists those that there are",
-                                 (int)length, at);
-        at = at[length] == ',' ? at + length + 1 : NULL;
-    }
-    return true;
-}
-
-static bool make_schema(build *b, mospt_err *err)
-{
-    const char *wanted = b->options->attributes;
-    mospt_schema *schema = &b->metadata->schema;
-    const prep_source *source = &b->result->source;
-    *schema = (mospt_schema){0};
-    if (!check_wanted(b, err)) return false;
-    if (!mospt_schema_add(schema, "scan", source->scan_count > UINT16_MAX ? MOSPT_U32 : MOSPT_U16,
-                          1, err))
-        return false;
-    for (uint32_t i = 0; i < source->scan_count; i++) {
-        const mospt_schema *planes = &source->scans[i].info.attributes;
-        for (uint32_t k = 0; k < planes->count; k++) {
-            const mospt_attribute *a = &planes->at[k];
-            if (wanted != NULL && !list_has(wanted, a->name)) continue;
-            if (mospt_schema_add(schema, a->name, a->type, a->components, err)) continue;
-            if (err != NULL && err->file[0] == '\0')
-                snprintf(err->file, sizeof err->file, "%s", source->scans[i].path);
-            return false;
-        }
-    }
-    return true;
-}
-
 static bool check_space(const char *folder, uint64_t needed, const char *what, mospt_err *err)
 {
     struct statvfs disk;
@@ -173,16 +114,16 @@ static bool check_space(const char *folder, uint64_t needed, const char *what, m
 }
 
 /* Says how much disk will be needed, and stops where it is not there. */
-static bool check_disks(build *b, mospt_err *err)
+static bool check_disks(build *b, bool again, mospt_err *err)
 {
-    uint64_t bytes = b->points_total * mospt_record_size(&b->metadata->schema),
+    uint64_t bytes = mospt_payload_size(&b->metadata->schema, b->points_total),
              scratch = bytes + bytes / 16;
     /* Of a pass, and of one in it, blocks that are not full are left, too. */
     if (bytes + 2 * b->plan.spools_size < b->plan.store_memory) scratch = 0;
     b->result->scratch_announced = scratch + b->result->source.spool_size;
     if (b->options->announce != NULL)
         b->options->announce(b->options->context, b->points_total, b->result->scratch_announced,
-                             bytes);
+                             bytes, again);
     if (!check_space(b->scratch_folder, scratch, "scratch space", err)) return false;
     char *folder = prep_output_folder(b->output.target);
     bool ok = folder != NULL && check_space(folder, bytes, "the dataset", err);
@@ -190,12 +131,28 @@ static bool check_disks(build *b, mospt_err *err)
     return ok;
 }
 
+/* Divides what there is among points with the attributes of the schema. */
+static bool plan_tree(build *b, bool again, mospt_err *err)
+{
+    const mospt_metadata *m = b->metadata;
+    if (!prep_plan_make(b->memory, mospt_record_size(&m->schema), m->inner_depth,
+                        prep_workers_count(b->workers), &b->plan, err) ||
+        !check_disks(b, again, err))
+        return false;
+    /* The page cache is left to others by what would be more than its share of it. */
+    if (b->bypasses_cache || mospt_payload_size(&m->schema, b->points_total) <= b->memory / 2)
+        return true;
+    b->bypasses_cache = true;
+    return mospt_writer_bypass_cache(b->writer, b->plan.chunk_size, err);
+}
+
 /* A batch of a scan on its way into the first pass. */
 typedef struct {
     const prep_batch *batch;
     prep_packer packer;
-    prep_pack_sums *sums;  /* [slices] */
-    prep_implied *implied; /* [slices] */
+    prep_pack_sums *sums; /* [slices] */
+    uint8_t *records;     /* [slices][PREP_PASS_SLICE][record], of points that are only looked at;
+                             owned; NULL: none are */
 } packing;
 
 static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
@@ -204,10 +161,16 @@ static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
     uint32_t begin = slice * PREP_PASS_SLICE, left = p->batch->count - begin;
     uint32_t count = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
     p->sums[slice] = prep_pack_sums_empty;
-    p->implied[slice] = (prep_implied){0};
-    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice],
-              &p->implied[slice]);
+    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice]);
     return p->sums[slice].outside ? 0 : count;
+}
+
+/* Job: the same for points that go nowhere. */
+static void look_at_slice(void *context, uint32_t slice)
+{
+    packing *p = context;
+    size_t size = PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
+    pack_slice(p, slice, p->records + slice * size);
 }
 
 static uint32_t slices_of(uint32_t count)
@@ -215,41 +178,64 @@ static uint32_t slices_of(uint32_t count)
     return (count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE;
 }
 
+/* How a try at the tree came out. */
+typedef enum {
+    TRY_DONE,
+    TRY_OUTSIDE, /* a point was outside the root cube, which header bounds have promised not to
+                    happen: start again */
+    TRY_DIFFERS, /* points have less in common than the first ones: start again, with a schema that
+                    now says what all have */
+} outcome;
+
+/* From now on points are only looked at. */
+static bool give_up_pass(build *b, prep_pass **pass, uint32_t batch_slices, packing *p,
+                         mospt_err *err)
+{
+    size_t size = batch_slices * PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
+    prep_pass_abandon(*pass);
+    *pass = NULL;
+    enter(b, PREP_PHASE_MEASURE);
+    p->records = malloc(size);
+    return p->records != NULL || mospt_err_nomem(err, size);
+}
+
 /* Streams all scans through the first pass.
- * outside  out: a point was outside the root cube, which header bounds have promised not to happen;
- *          start again */
-static bool stream_points(build *b, prep_pass *pass, uint32_t batch_slices, prep_pack_sums *of_scan,
-                          bool *outside, mospt_err *err)
+ * pass     out: NULL if there is nothing to go on with */
+static bool stream_points(build *b, prep_pass **pass, uint32_t batch_slices,
+                          prep_pack_sums *of_scan, outcome *out, mospt_err *err)
 {
     prep_source *source = &b->result->source;
+    mospt_schema *schema = &b->metadata->schema;
     prep_stream *stream = NULL;
     uint64_t points = 0;
-    packing p = {.packer = {.grid = &b->metadata->grid, .schema = &b->metadata->schema},
-                 .sums = malloc(batch_slices * sizeof *p.sums),
-                 .implied = malloc(batch_slices * sizeof *p.implied)};
-    bool ok = (p.sums != NULL && p.implied != NULL) ||
-              mospt_err_nomem(err, batch_slices * (sizeof *p.sums + sizeof *p.implied));
-    b->implied = (prep_implied){0};
+    prep_pack_sums all = prep_pack_sums_empty;
+    packing p = {.packer = {.grid = &b->metadata->grid, .schema = schema},
+                 .sums = malloc(batch_slices * sizeof *p.sums)};
+    bool ok = p.sums != NULL || mospt_err_nomem(err, batch_slices * sizeof *p.sums);
     ok = ok && prep_stream_open(source, batch_slices * PREP_PASS_SLICE, &stream, err);
-    while (ok && !*outside) {
+    while (ok && !all.outside) {
         uint32_t scan = 0;
         ok = prep_stream_next(stream, &p.batch, &scan, err);
         if (!ok || p.batch == NULL) break;
         p.packer.planes = &source->scans[scan].info.attributes;
         p.packer.scan = scan;
         uint32_t slices = slices_of(p.batch->count);
-        ok = prep_pass_insert(pass, slices, pack_slice, &p, err);
+        if (*pass != NULL) ok = prep_pass_insert(*pass, slices, pack_slice, &p, err);
+        else prep_workers_run(b->workers, slices, look_at_slice, &p);
         for (uint32_t i = 0; i < slices; i++) {
-            *outside = *outside || p.sums[i].outside;
             prep_pack_sums_add(&of_scan[scan], &p.sums[i]);
-            prep_implied_add(&b->implied, p.packer.schema, &p.implied[i]);
+            prep_pack_sums_add(&all, &p.sums[i]);
         }
+        if (ok && *pass != NULL && !prep_implied_holds(schema, &all.differs))
+            ok = give_up_pass(b, pass, batch_slices, &p, err);
         points += p.batch->count;
         if (ok && !tell(b, points))
             ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
     }
+    *out = all.outside ? TRY_OUTSIDE : *pass == NULL ? TRY_DIFFERS : TRY_DONE;
+    if (*out == TRY_DIFFERS) prep_implied_correct(schema, &all.differs);
     prep_stream_close(stream);
-    free(p.sums), free(p.implied);
+    free(p.sums), free(p.records);
     return ok;
 }
 
@@ -315,7 +301,6 @@ static bool write_tree(build *b, prep_pass *pass, const prep_pack_sums *of_scan,
         prep_pass_abandon(pass);
         return false;
     }
-    prep_implied_apply(&b->implied, &b->metadata->schema);
     b->metadata->point_count = b->points_total;
     if (b->resume != NULL) {
         const mospt_metadata *kept = prep_resume_metadata(b->resume);
@@ -330,16 +315,15 @@ static bool write_tree(build *b, prep_pass *pass, const prep_pack_sums *of_scan,
     return prep_generations_stop(generations, ok ? err : NULL) && ok;
 }
 
-/* Takes over the passes. `*outside` as for stream_points(). */
-static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, bool *outside,
+static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, outcome *out,
                        mospt_err *err)
 {
     const prep_source *source = &b->result->source;
     prep_pass *pass = NULL;
     enter(b, PREP_PHASE_READ);
     bool ok = prep_pass_begin(env, b->metadata->grid.root, 0, &pass, err) &&
-              stream_points(b, pass, env->batch_slices, of_scan, outside, err);
-    if (!ok || *outside) {
+              stream_points(b, &pass, env->batch_slices, of_scan, out, err);
+    if (!ok || *out != TRY_DONE) {
         prep_pass_abandon(pass);
         return ok;
     }
@@ -357,7 +341,7 @@ static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, bo
 }
 
 /* One try at the whole tree. */
-static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_err *err)
+static bool build_tree(build *b, prep_pack_sums *of_scan, outcome *out, mospt_err *err)
 {
     uint32_t spooled_slices = slices_of(PREP_BATCH_CAPACITY); /* of what text has said */
     b->shape = (prep_shape){.grid = &b->metadata->grid,
@@ -384,9 +368,10 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
                          .report_context = b};
     if (b->result->source.spool_size > 0 && env.batch_slices < spooled_slices)
         env.batch_slices = spooled_slices;
-    ok = ok && run_passes(b, &env, of_scan, outside, err);
-    if (b->store != NULL)
-        b->result->scratch_bytes = prep_store_scratch_peak(b->store) + b->result->source.spool_size;
+    ok = ok && run_passes(b, &env, of_scan, out, err);
+    uint64_t scratch = b->result->source.spool_size;
+    if (b->store != NULL) scratch += prep_store_scratch_peak(b->store);
+    if (scratch > b->result->scratch_bytes) b->result->scratch_bytes = scratch;
     prep_resume_close(b->resume);
     prep_store_destroy(b->store);
     prep_arena_destroy(b->arena);
@@ -394,6 +379,28 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, bool *outside, mospt_e
     b->store = NULL;
     b->arena = NULL;
     return ok;
+}
+
+/* Tries again where the points are not as their headers, or the first of them, have promised. */
+static bool try_until_done(build *b, prep_pack_sums *of_scan, mospt_err *err)
+{
+    const prep_source *source = &b->result->source;
+    bool is_measured = false, again = false;
+    for (outcome out = TRY_DIFFERS; out != TRY_DONE; again = true) {
+        bool is_doubtful = false;
+        if (out == TRY_OUTSIDE && is_measured)
+            return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
+                                 "the scans changed while they were read");
+        if (out == TRY_OUTSIDE && !measure(b, true, err)) return false;
+        if (out == TRY_DIFFERS && !plan_tree(b, again, err)) return false;
+        is_measured = is_measured || out == TRY_OUTSIDE;
+        for (uint32_t i = 0; i < source->scan_count; i++)
+            of_scan[i] = prep_pack_sums_empty;
+        if (!prep_frame_grid(source, &b->metadata->grid, &is_doubtful, err)) return false;
+        if (is_doubtful) out = TRY_OUTSIDE;
+        else if (!build_tree(b, of_scan, &out, err)) return false;
+    }
+    return true;
 }
 
 /* Conservation of points is not a hope: what was read is what was written. */
@@ -415,10 +422,9 @@ static bool run(build *b, mospt_err *err)
     prep_source *source = &b->result->source;
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     uint32_t threads = o->threads > 0 ? o->threads : processors > 0 ? (uint32_t)processors : 1;
-    uint64_t memory = o->memory > 0 ? o->memory : prep_plan_machine_memory() / 4;
-    prep_pack_sums *of_scan = NULL;
-    bool ok = false, outside = false;
+    prep_pack_sums *of_scan;
 
+    b->memory = o->memory > 0 ? o->memory : prep_plan_machine_memory() / 4;
     b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
     b->metadata->add_threshold = PREP_ADD_THRESHOLD;
     if (!prep_output_choose(o->output, o->force, &b->output, err) || !choose_scratch(b, err))
@@ -430,40 +436,17 @@ static bool run(build *b, mospt_err *err)
     if (!prep_source_open(&b->result->files, &o->scans, b->scratch_folder, source, err))
         return false;
     if (!measure(b, false, err)) return false;
-    if (!make_schema(b, err)) return false;
-    if (!prep_plan_make(memory, mospt_record_size(&b->metadata->schema), b->metadata->inner_depth,
-                        threads, &b->plan, err))
-        return false;
-    if (!check_disks(b, err) || !prep_workers_create(threads, &b->workers, err)) return false;
-    /* The page cache is left to others by what would be more than its share of it. */
-    if (b->points_total * mospt_record_size(&b->metadata->schema) > memory / 2 &&
-        !mospt_writer_bypass_cache(b->writer, b->plan.chunk_size, err))
-        return false;
-
+    if (!prep_attributes_choose(source, o->attributes, &b->metadata->schema, err)) return false;
+    if (!prep_workers_create(threads, &b->workers, err)) return false;
     of_scan = malloc(source->scan_count * sizeof *of_scan);
     if (of_scan == NULL) return mospt_err_nomem(err, source->scan_count * sizeof *of_scan);
-    for (int attempt = 0; attempt == 0 || outside; attempt++) {
-        /* Bounds that lie: measure all scans, and start again with what they really are. */
-        if (outside && !measure(b, true, err)) goto done;
-        for (uint32_t i = 0; i < source->scan_count; i++)
-            of_scan[i] = prep_pack_sums_empty;
-        if (!prep_frame_grid(source, &b->metadata->grid, &outside, err)) goto done;
-        if (outside) continue;
-        if (!build_tree(b, of_scan, &outside, err)) goto done;
-        if (outside && attempt > 0) {
-            mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
-                          "the scans changed while they were read");
-            goto done;
-        }
-    }
-    ok = check_conservation(b, b->metadata, err);
+    bool ok = try_until_done(b, of_scan, err) && check_conservation(b, b->metadata, err);
+    free(of_scan);
     b->result->node_count = mospt_writer_nodes(b->writer);
     b->result->payload_bytes = mospt_writer_bytes(b->writer);
     ok = ok && mospt_writer_commit(b->writer, b->metadata, err) &&
          prep_output_take_place(&b->output, err);
     b->result->level_count = b->metadata->file_count;
-done:
-    free(of_scan);
     return ok;
 }
 

@@ -37,9 +37,11 @@ typedef struct {
     const char *crs;         /* coordinate reference system; NULL: what the scans say */
     /* Told often, by one thread at a time; returns false to stop. NULL: none. */
     bool (*progress)(void *context, const prep_progress *progress);
-    /* Told once, before the points are read: points (0: unknown) and the scratch space that may be
-     * needed. */
-    void (*announce)(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes);
+    /* Told before the points are read: points (0: unknown), and the scratch space that may be
+     * needed. And `again` if they have less in common than the first of them, so that they are read
+     * once more. */
+    void (*announce)(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes,
+                     bool again);
     void *context;
 } prep_build_options;
 

@@ -16,7 +16,9 @@ typedef struct {
 
 static prep_dedupe_scan *scan_of(const dedupe *d, const uint8_t *record)
 {
-    const uint8_t *value = record + sizeof(mospt_vertex) + d->scan->offset;
+    const uint8_t *value = d->scan->storage == MOSPT_CONSTANT
+                               ? d->scan->constant
+                               : record + sizeof(mospt_vertex) + d->scan->stored_offset;
     return &d->scans[(uint32_t)mospt_type_read(d->scan->type, value)];
 }
 

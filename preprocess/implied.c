@@ -1,146 +1,86 @@
 #include "preprocess/implied.h"
 
-#include "mospt/payload.h"
-#include "mospt/wide.h"
+#include "mospt/turn.h"
 
-#include <stddef.h>
-
-/* Bytes of a record that are compared together. */
-enum { WINDOW = 16 };
-typedef uint8_t window __attribute__((vector_size(WINDOW)));
+#include <string.h>
 
 static bool has(uint64_t set, uint32_t k)
 {
     return set >> k & 1;
 }
 
-static const uint8_t *row_of(const mospt_attribute *a, const uint8_t *record)
+void prep_implied_begin(mospt_schema *schema, const uint8_t *const *planes)
 {
-    return record + sizeof(mospt_vertex) + a->offset;
+    for (uint32_t k = 0; k < schema->count; k++)
+        if (mospt_attribute_can_be(&schema->at[k], MOSPT_CONSTANT))
+            mospt_schema_keep(schema, k, MOSPT_CONSTANT, planes[k]);
 }
 
-static void begin(prep_implied *o, const mospt_schema *schema, const uint8_t *record)
+/* Each value of a plane is that of the point before it. */
+static bool is_constant(const mospt_attribute *a, const uint8_t *plane, uint32_t count)
 {
-    o->has_points = true;
-    for (uint32_t k = 0; k < schema->count; k++) {
-        const mospt_attribute *a = &schema->at[k];
-        if (mospt_attribute_can_be(a, MOSPT_CONSTANT))
-            memcpy(o->value[k], row_of(a, record), mospt_attribute_size(a));
-        else o->varies |= UINT64_C(1) << k;
-        if (!mospt_attribute_can_be(a, MOSPT_OF_COLOUR)) o->off_colour |= UINT64_C(1) << k;
+    size_t size = mospt_attribute_size(a);
+    return memcmp(plane, a->constant, size) == 0 &&
+           memcmp(plane, plane + size, (count - 1) * size) == 0;
+}
+
+/* The colours of four points fill a row, and twice as much, without intensity, one and a half. */
+static bool is_of_colour(const uint8_t *plane, const uint8_t *rgbi, uint32_t count)
+{
+    enum { POINTS = 4, HALF = MOSPT_TURN / 2, SIZE = 6 };
+    mospt_row differences = {0};
+    uint32_t i = 0;
+    for (; i + POINTS <= count; i += POINTS) {
+        mospt_row c, first, last;
+        const uint8_t *values = plane + (size_t)i * SIZE;
+        memcpy(&c, rgbi + 4 * (size_t)i, sizeof c);
+        memcpy(&first, values, sizeof first);
+        memcpy(&last, values + HALF, sizeof last); /* half of it again */
+        differences |=
+            first ^ __builtin_shufflevector(c, c, 0, 0, 1, 1, 2, 2, 4, 4, 5, 5, 6, 6, 8, 8, 9, 9);
+        differences |= last ^ __builtin_shufflevector(c, c, 5, 5, 6, 6, 8, 8, 9, 9, 10, 10, 12, 12,
+                                                      13, 13, 14, 14);
     }
-}
-
-/* Bits in which some record differs from the first one, in the window that begins at `at`. */
-MOSPT_WIDE static window find_differences(const uint8_t *records, size_t stride, uint32_t count,
-                                          size_t at)
-{
-    window first, w, differences = {0};
-    memcpy(&first, records + at, WINDOW);
-    for (uint32_t i = 1; i < count; i++) {
-        memcpy(&w, records + i * stride + at, WINDOW);
-        differences |= w ^ first;
-    }
-    return differences;
-}
-
-/* The attributes of the set that have bytes in [begin, begin + WINDOW) of a record. */
-static uint64_t within(const mospt_schema *schema, uint64_t set, size_t begin)
-{
-    uint64_t found = 0;
-    for (uint32_t k = 0; k < schema->count; k++) {
-        const mospt_attribute *a = &schema->at[k];
-        size_t at = sizeof(mospt_vertex) + a->offset;
-        if (has(set, k) && at < begin + WINDOW && begin < at + mospt_attribute_size(a))
-            found |= UINT64_C(1) << k;
-    }
-    return found;
-}
-
-static bool differs(const mospt_attribute *a, window differences, size_t begin)
-{
-    size_t at = sizeof(mospt_vertex) + a->offset, end = at + mospt_attribute_size(a);
     bool found = false;
-    for (size_t i = at > begin ? at - begin : 0; i < WINDOW && begin + i < end; i++)
-        found = found || differences[i] != 0;
-    return found;
+    for (int b = 0; b < MOSPT_TURN; b++)
+        found = found || differences[b] != 0;
+    for (; i < count; i++)
+        for (uint32_t b = 0; b < SIZE; b++)
+            found = found || plane[i * SIZE + b] != rgbi[4 * i + b / 2];
+    return !found;
 }
 
-/* Of the attributes that are the same so far, those that are not among these records. */
-static uint64_t find_varying(uint64_t same, const mospt_schema *schema, const uint8_t *records,
-                             uint32_t count)
+void prep_implied_look(const mospt_attribute *a, uint32_t k, const uint8_t *plane,
+                       const uint8_t *rgbi, uint32_t count, prep_differing *differs)
 {
-    size_t stride = mospt_record_size(schema);
-    uint64_t varying = 0;
-    for (size_t at = sizeof(mospt_vertex); at < stride; at += WINDOW) {
-        size_t begin = at + WINDOW <= stride ? at : stride - WINDOW;
-        uint64_t here = within(schema, same & ~varying, begin);
-        if (here == 0) continue;
-        window differences = find_differences(records, stride, count, begin);
-        for (uint32_t k = 0; k < schema->count; k++)
-            if (has(here, k) && differs(&schema->at[k], differences, begin))
-                varying |= UINT64_C(1) << k;
-    }
-    return varying;
-}
-
-/* The same for six bytes at the end of the window, from twice the bytes of the colour. */
-MOSPT_WIDE static window find_colour_differences(const uint8_t *records, size_t stride,
-                                                 uint32_t count, size_t at)
-{
-    window w, differences = {0};
-    for (uint32_t i = 0; i < count; i++, records += stride) {
-        window colour = {0};
-        memcpy(&colour, records + offsetof(mospt_vertex, r), 4);
-        memcpy(&w, records + at, WINDOW);
-        differences |= w ^ __builtin_shufflevector(colour, colour, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 0,
-                                                   0, 1, 1, 2, 2);
-    }
-    return differences;
-}
-
-static bool is_of_colour(const mospt_attribute *a, const uint8_t *records, size_t stride,
-                         uint32_t count)
-{
-    size_t end = sizeof(mospt_vertex) + a->offset + mospt_attribute_size(a);
-    window differences = find_colour_differences(records, stride, count, end - WINDOW);
-    return !differs(a, differences, end - WINDOW);
-}
-
-void prep_implied_look(prep_implied *o, const mospt_schema *schema, const uint8_t *records,
-                       uint32_t count)
-{
-    prep_implied block = {0};
     if (count == 0) return;
-    begin(&block, schema, records);
-    block.varies |= o->varies, block.off_colour |= o->off_colour; /* that is known */
-    block.varies |= find_varying(~block.varies, schema, records, count);
-    for (uint32_t k = 0; k < schema->count; k++)
-        if (!has(block.off_colour, k) &&
-            !is_of_colour(&schema->at[k], records, mospt_record_size(schema), count))
-            block.off_colour |= UINT64_C(1) << k;
-    prep_implied_add(o, schema, &block);
+    if (a->storage == MOSPT_CONSTANT && !has(differs->in_value, k) && !is_constant(a, plane, count))
+        differs->in_value |= UINT64_C(1) << k;
+    if (mospt_attribute_can_be(a, MOSPT_OF_COLOUR) && !has(differs->from_colour, k) &&
+        !is_of_colour(plane, rgbi, count))
+        differs->from_colour |= UINT64_C(1) << k;
 }
 
-void prep_implied_add(prep_implied *o, const mospt_schema *schema, const prep_implied *more)
+bool prep_implied_holds(const mospt_schema *schema, const prep_differing *differs)
 {
-    if (!more->has_points) return;
-    if (!o->has_points) {
-        *o = *more;
-        return;
+    bool holds = true;
+    for (uint32_t k = 0; k < schema->count; k++) {
+        mospt_storage storage = schema->at[k].storage;
+        holds = holds && !(storage == MOSPT_CONSTANT && has(differs->in_value, k)) &&
+                !(storage == MOSPT_OF_COLOUR && has(differs->from_colour, k));
     }
-    o->varies |= more->varies;
-    o->off_colour |= more->off_colour;
-    for (uint32_t k = 0; k < schema->count; k++)
-        if (!has(o->varies, k) &&
-            memcmp(o->value[k], more->value[k], mospt_attribute_size(&schema->at[k])) != 0)
-            o->varies |= UINT64_C(1) << k;
+    return holds;
 }
 
-void prep_implied_apply(const prep_implied *o, mospt_schema *schema)
+void prep_implied_correct(mospt_schema *schema, const prep_differing *differs)
 {
-    for (uint32_t k = 0; o->has_points && k < schema->count; k++) {
-        if (!has(o->varies, k)) mospt_schema_keep(schema, k, MOSPT_CONSTANT, o->value[k]);
-        else if (!has(o->off_colour, k)) mospt_schema_keep(schema, k, MOSPT_OF_COLOUR, NULL);
+    for (uint32_t k = 0; k < schema->count; k++) {
+        const mospt_attribute *a = &schema->at[k];
+        bool is_colour =
+            mospt_attribute_can_be(a, MOSPT_OF_COLOUR) && !has(differs->from_colour, k);
+        if (a->storage == MOSPT_CONSTANT && has(differs->in_value, k))
+            mospt_schema_keep(schema, k, is_colour ? MOSPT_OF_COLOUR : MOSPT_IN_PLANE, NULL);
+        else if (a->storage == MOSPT_OF_COLOUR && !is_colour)
+            mospt_schema_keep(schema, k, MOSPT_IN_PLANE, NULL);
     }
 }

@@ -3,25 +3,31 @@
  *
  * A scan without classification says 0 ten million times, and most scanners' 16-bit colours are 8
  * bits twice. Such a thing is written once, into metadata.json; what is read from the dataset has
- * it again. */
+ * it again. It is guessed from the first points of each scan, so that not even the builder has to
+ * carry it, and holds if no point differs. */
 #pragma once
 #include "mospt/schema.h"
 
-/* What the points that were looked at have in common; begins as {0}. */
+/* Attributes in which some point is not as its schema says: bit k is attribute k. */
 typedef struct {
-    bool has_points;
-    uint64_t varies;     /* bit k: attribute k is not the same in all of them */
-    uint64_t off_colour; /* bit k: attribute k is not the colour of each */
-    uint8_t value[MOSPT_ATTRIBUTES_MAX][MOSPT_CONSTANT_SIZE_MAX]; /* of all, or of one of them */
-} prep_implied;
+    uint64_t in_value;    /* from the constant */
+    uint64_t from_colour; /* from its colour */
+} prep_differing;
 
-/* Looks at more points.
- * records  [count][mospt_record_size()] */
-void prep_implied_look(prep_implied *implied, const mospt_schema *schema, const uint8_t *records,
-                       uint32_t count);
+/* Says that attributes are constant, as far as they can be: each as the first point has it.
+ * planes   [schema->count], of points with these attributes, at least one */
+void prep_implied_begin(mospt_schema *schema, const uint8_t *const *planes);
 
-/* Takes in what others have in common. */
-void prep_implied_add(prep_implied *implied, const mospt_schema *schema, const prep_implied *more);
+/* Looks at an attribute that is said to be constant or the colour.
+ * index    of the attribute
+ * plane    [count] values
+ * rgbi     [count][4]
+ * differs  what is found is added; what is there is not looked for again */
+void prep_implied_look(const mospt_attribute *attribute, uint32_t index, const uint8_t *plane,
+                       const uint8_t *rgbi, uint32_t count, prep_differing *differs);
 
-/* Says how the attributes of those points are kept. */
-void prep_implied_apply(const prep_implied *implied, mospt_schema *schema);
+/* True if what the schema says holds. */
+bool prep_implied_holds(const mospt_schema *schema, const prep_differing *differs);
+
+/* Makes it say what holds. */
+void prep_implied_correct(mospt_schema *schema, const prep_differing *differs);

@@ -90,7 +90,6 @@ typedef struct {
     double scale[3], offset[3];
     bool has_rgb, rgb_is_16;
     bool has_intensity;
-    bool has_old_head; /* the first fields are those of formats 0 to 5 */
     prep_tone tone;
     uint32_t rgb_at;
     prep_las_field field[MOSPT_ATTRIBUTES_MAX];

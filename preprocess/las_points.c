@@ -1,5 +1,6 @@
 #include "preprocess/las.h"
 
+#include "mospt/turn.h"
 #include "mospt/wide.h"
 #include "preprocess/bytes.h"
 
@@ -7,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Formats below 6 have these first: intensity, and those of add_standard_old(). */
-enum { INTENSITY_AT = 12, HEAD_AT = INTENSITY_AT, OLD_HEAD_FIELDS = 8 };
+enum { INTENSITY_AT = 12 };
 
 enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 
@@ -150,7 +150,6 @@ void prep_las_layout_make(prep_scan *scan, const prep_las_header *header, prep_l
     layout.rgb_is_16 = sample->rgb_max > 255;
 
     add_copy(scan, &layout, "intensity", MOSPT_U16, 1, 12);
-    layout.has_old_head = format < 6;
     if (format < 6) add_standard_old(scan, &layout);
     else add_standard_new(scan, &layout);
     if (part[format].gps != 0) add_copy(scan, &layout, "gps_time", MOSPT_F64, 1, part[format].gps);
@@ -195,11 +194,9 @@ static uint8_t intensity_of(const prep_las_layout *l, const uint8_t *record)
     return l->has_intensity ? prep_tone_apply(&l->tone, prep_le16(record + INTENSITY_AT)) : 255;
 }
 
-static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
-                           size_t out_stride)
+static void show_intensity(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out)
 {
-    size_t stride = l->record_length;
-    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride)
+    for (uint32_t i = 0; i < count; i++, p += l->record_length, out += 4)
         memset(out, intensity_of(l, p), 4);
 }
 
@@ -216,8 +213,7 @@ MOSPT_WIDE static void show_block(uint16_t rgb[3][BLOCK], const uint8_t *intensi
 }
 
 /* At most BLOCK points. */
-static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
-                        size_t out_stride)
+static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out)
 {
     uint16_t rgb[3][BLOCK], raw[BLOCK];
     uint8_t intensity[BLOCK];
@@ -231,8 +227,8 @@ static void show_rgb_16(const prep_las_layout *l, const uint8_t *p, uint32_t cou
     if (l->has_intensity) prep_tone_apply_16(&l->tone, raw, count, intensity);
     else memset(intensity, UINT8_MAX, count);
     show_block(rgb, intensity, count, shown);
-    for (uint32_t i = 0; i < count; i++, out += out_stride)
-        prep_put_le32(out, shown[i]);
+    for (uint32_t i = 0; i < count; i++)
+        prep_put_le32(out + 4 * (size_t)i, shown[i]);
 }
 
 static uint8_t at_most_255(uint16_t v)
@@ -240,133 +236,114 @@ static uint8_t at_most_255(uint16_t v)
     return v < 255 ? (uint8_t)v : 255;
 }
 
-static void show_rgb_8(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out,
-                       size_t out_stride)
+static void show_rgb_8(const prep_las_layout *l, const uint8_t *p, uint32_t count, uint8_t *out)
 {
     size_t stride = l->record_length, at = l->rgb_at;
-    for (uint32_t i = 0; i < count; i++, p += stride, out += out_stride) {
+    for (uint32_t i = 0; i < count; i++, p += stride, out += 4) {
         uint8_t rgbi[4] = {at_most_255(prep_le16(p + at)), at_most_255(prep_le16(p + at + 2)),
                            at_most_255(prep_le16(p + at + 4)), intensity_of(l, p)};
         memcpy(out, rgbi, sizeof rgbi);
     }
 }
 
-/* One field of a block: where it is read and where it is written. */
-typedef struct {
-    const uint8_t *from;
-    size_t from_stride;
-    uint8_t *to;
-    size_t to_stride;
-    uint32_t count;
-} run;
-
-static void copy_1(run r)
+/* A field that is not narrow: its bytes are copied as they are.
+ * p        the field in the first record */
+static void copy_wide(const prep_las_field *f, const uint8_t *p, size_t stride, uint32_t count,
+                      uint8_t *out)
 {
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
-        *r.to = *r.from;
-}
-
-static void copy_2(run r)
-{
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
-        uint16_t v = prep_le16(r.from);
-        memcpy(r.to, &v, 2);
-    }
-}
-
-static void copy_6(run r)
-{
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
-        for (size_t c = 0; c < 6; c += 2) {
-            uint16_t v = prep_le16(r.from + c);
-            memcpy(r.to + c, &v, 2);
+    size_t size = f->size, row = size * f->components;
+    if (row == 6) /* colours: a load and a store */
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(out + i * 6, p + i * stride, 6);
+    else if (row == 8)
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(out + i * 8, p + i * stride, 8);
+    else
+        for (uint32_t i = 0; i < count; i++)
+            memcpy(out + i * row, p + i * stride, row);
+    if (!prep_host_is_big_endian()) return;
+    for (size_t i = 0; i < count * row; i += size)
+        for (size_t k = 0; k < size / 2; k++) {
+            uint8_t byte = out[i + k];
+            out[i + k] = out[i + size - 1 - k];
+            out[i + size - 1 - k] = byte;
         }
 }
 
-static void copy_8(run r)
+/* Bytes of a record that a narrow field is made of; 0: it is not narrow. */
+static uint32_t narrow_size(const prep_las_field *f)
 {
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
-        uint64_t v = prep_le64(r.from);
-        memcpy(r.to, &v, 8);
+    if (f->kind == FIELD_FLAGS_OLD) return 2;
+    if (f->kind != FIELD_COPY) return 1;
+    return f->components == 1 && f->size <= 2 ? f->size : 0;
+}
+
+/* Columns of the bytes of a block, MOSPT_TURN of each record from `at` on. */
+typedef struct {
+    size_t at;
+    uint8_t column[MOSPT_TURN][BLOCK];
+} columns;
+
+static void turn(const uint8_t *p, size_t stride, uint32_t count, size_t at, columns *out)
+{
+    mospt_row rows[MOSPT_TURN];
+    out->at = at;
+    for (uint32_t start = 0; start < count; start += MOSPT_TURN) {
+        for (uint32_t i = 0; i < MOSPT_TURN; i++) /* what is behind the last one does not matter */
+            memcpy(&rows[i], p + (start + i < count ? start + i : start) * stride + at, MOSPT_TURN);
+        mospt_turn(rows);
+        for (uint32_t i = 0; i < MOSPT_TURN; i++)
+            memcpy(out->column[i] + start, &rows[i], MOSPT_TURN);
     }
 }
 
-/* Several components, or sizes that are rare. */
-static void copy_any(const prep_las_field *f, run r)
+static void join(const uint8_t *restrict low, const uint8_t *restrict high, uint32_t count,
+                 uint8_t *restrict out)
 {
-    size_t size = f->size, row = size * f->components;
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
-        memcpy(r.to, r.from, row);
-        if (!prep_host_is_big_endian()) continue;
-        for (size_t k = 0; k < row; k++)
-            r.to[k] = r.from[k - k % size + size - 1 - k % size];
+    for (uint32_t i = 0; i < count; i++) {
+        uint16_t value = (uint16_t)(low[i] | high[i] << 8);
+        memcpy(out + 2 * (size_t)i, &value, sizeof value);
     }
 }
 
-static void copy_field(const prep_las_field *f, run r)
+/* Flags of the two bytes in which formats below 6 have them. */
+static void join_flags(const uint8_t *restrict first, const uint8_t *restrict second,
+                       uint32_t count, uint8_t *restrict out)
 {
-    if (f->components == 3 && f->size == 2) copy_6(r);
-    else if (f->components != 1) copy_any(f, r);
-    else if (f->size == 1) copy_1(r);
-    else if (f->size == 2) copy_2(r);
-    else if (f->size == 8) copy_8(r);
-    else copy_any(f, r);
+    for (uint32_t i = 0; i < count; i++)
+        out[i] = (uint8_t)(second[i] >> 5 | (first[i] >> 6 & 1) << 4 | first[i] >> 7 << 5);
 }
 
-static uint8_t flags_old(const uint8_t *p)
+static void take_flags(const uint8_t *restrict from, uint32_t count, uint8_t *restrict out)
 {
-    return (uint8_t)((p[1] >> 5) | (p[0] >> 6 & 1) << 4 | (p[0] >> 7) << 5);
+    for (uint32_t i = 0; i < count; i++)
+        out[i] = (uint8_t)((from[i] & 15) | (from[i] >> 6 & 1) << 4 | from[i] >> 7 << 5);
 }
 
-static uint8_t flags_new(const uint8_t *p)
+static void take_bits(const uint8_t *restrict from, uint32_t shift, uint32_t mask, uint32_t count,
+                      uint8_t *restrict out)
 {
-    return (uint8_t)((p[0] & 15) | (p[0] >> 6 & 1) << 4 | (p[0] >> 7) << 5);
+    for (uint32_t i = 0; i < count; i++)
+        out[i] = (uint8_t)(from[i] >> shift & mask);
 }
 
-static void unpack_field(const prep_las_field *f, run r)
+/* A field of a byte or two, from columns that have it. */
+static void unpack_narrow(const prep_las_field *f, const columns *c, uint32_t count, uint8_t *out)
 {
-    uint8_t shift = f->shift, mask = f->mask;
+    const uint8_t *first = c->column[f->at - c->at];
     switch (f->kind) {
-    case FIELD_COPY:
-        copy_field(f, r);
-        break;
     case FIELD_BITS:
-        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
-            *r.to = (uint8_t)(*r.from >> shift & mask);
-        break;
+        take_bits(first, f->shift, f->mask, count, out);
+        return;
     case FIELD_FLAGS_OLD:
-        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
-            *r.to = flags_old(r.from);
-        break;
+        join_flags(first, c->column[f->at - c->at + 1], count, out);
+        return;
+    case FIELD_FLAGS_NEW:
+        take_flags(first, count, out);
+        return;
     default:
-        for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride)
-            *r.to = flags_new(r.from);
-        break;
-    }
-}
-
-/* True if the first fields follow each other where they are written. */
-static bool is_row(const prep_las_layout *l, const prep_places *to, uint32_t fields)
-{
-    bool is = to->plane[0] != NULL && !prep_host_is_big_endian();
-    for (uint32_t k = 1; is && k < fields; k++)
-        is = to->plane[k] == to->plane[k - 1] + l->field[k - 1].size &&
-             to->plane_stride[k] == to->plane_stride[0];
-    return is;
-}
-
-/* The fields that add_standard_old() and the intensity before them make, all at once: 8 bytes of a
- * record become 10. */
-static void unpack_old_head(run r)
-{
-    for (uint32_t i = 0; i < r.count; i++, r.from += r.from_stride, r.to += r.to_stride) {
-        uint64_t head = prep_le64(r.from), returns = head >> 16 & 0xff, class = head >> 24 & 0xff;
-        uint64_t flags = class >> 5 | (returns >> 6 & 1) << 4 | returns >> 7 << 5;
-        uint64_t row = (head & 0xffff) | (returns & 7) << 16 | (returns >> 3 & 7) << 24 |
-                       (class & 31) << 32 | flags << 40 | (head >> 32 & 0xffff) << 48;
-        uint16_t source = (uint16_t)(head >> 48);
-        memcpy(r.to, &row, sizeof row);
-        memcpy(r.to + sizeof row, &source, sizeof source);
+        if (f->size == 1) memcpy(out, first, count);
+        else join(first, c->column[f->at - c->at + 1], count, out);
     }
 }
 
@@ -374,28 +351,27 @@ static void unpack_old_head(run r)
 static void unpack_block(const prep_las_layout *l, const uint8_t *records, uint32_t begin,
                          uint32_t count, const prep_places *to)
 {
-    uint8_t *rgbi = to->rgbi + begin * to->rgbi_stride;
-    records += begin * (size_t)l->record_length;
+    uint8_t *rgbi = to->rgbi + 4 * (size_t)begin;
+    size_t stride = l->record_length;
+    columns c = {.at = stride}; /* none yet */
+    records += begin * stride;
     if (to->xyz != NULL) decode_xyz(l, records, count, to->xyz + 3 * (size_t)begin);
-    if (l->has_rgb && l->rgb_is_16) show_rgb_16(l, records, count, rgbi, to->rgbi_stride);
-    else if (l->has_rgb) show_rgb_8(l, records, count, rgbi, to->rgbi_stride);
-    else show_intensity(l, records, count, rgbi, to->rgbi_stride);
-    uint32_t k = 0;
-    if (l->has_old_head && is_row(l, to, OLD_HEAD_FIELDS)) {
-        unpack_old_head((run){.from = records + HEAD_AT,
-                              .from_stride = l->record_length,
-                              .to = to->plane[0] + begin * to->plane_stride[0],
-                              .to_stride = to->plane_stride[0],
-                              .count = count});
-        k = OLD_HEAD_FIELDS;
-    }
-    for (; k < l->field_count; k++) {
+    if (l->has_rgb && l->rgb_is_16) show_rgb_16(l, records, count, rgbi);
+    else if (l->has_rgb) show_rgb_8(l, records, count, rgbi);
+    else show_intensity(l, records, count, rgbi);
+    for (uint32_t k = 0; k < l->field_count; k++) {
+        const prep_las_field *f = &l->field[k];
+        size_t narrow = narrow_size(f), row = (size_t)f->size * f->components;
         if (to->plane[k] == NULL) continue;
-        unpack_field(&l->field[k], (run){.from = records + l->field[k].at,
-                                         .from_stride = l->record_length,
-                                         .to = to->plane[k] + begin * to->plane_stride[k],
-                                         .to_stride = to->plane_stride[k],
-                                         .count = count});
+        uint8_t *out = to->plane[k] + begin * row;
+        if (narrow == 0) {
+            copy_wide(f, records + f->at, stride, count, out);
+            continue;
+        }
+        if ((size_t)f->at < c.at || f->at + narrow > c.at + MOSPT_TURN)
+            turn(records, stride, count,
+                 (size_t)f->at + MOSPT_TURN <= stride ? f->at : stride - MOSPT_TURN, &c);
+        unpack_narrow(f, &c, count, out);
     }
 }
 

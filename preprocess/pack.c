@@ -11,8 +11,8 @@
 /* Records that are packed plane by plane while they are in the first cache. */
 enum { BLOCK = 256 };
 
-/* Bytes for planes of a block that are not copied but converted. */
-enum { SCRATCH_SIZE = MOSPT_ROW_SIZE_MAX };
+/* Bytes for planes of a block. */
+enum { SPARE_SIZE = 2 * MOSPT_ROW_SIZE_MAX };
 
 const prep_pack_sums prep_pack_sums_empty = {.low = {UINT32_MAX, UINT32_MAX, UINT32_MAX}};
 
@@ -21,6 +21,8 @@ void prep_pack_sums_add(prep_pack_sums *sums, const prep_pack_sums *more)
     sums->hash += more->hash;
     sums->position_error = fmax(sums->position_error, more->position_error);
     sums->outside = sums->outside || more->outside;
+    sums->differs.in_value |= more->differs.in_value;
+    sums->differs.from_colour |= more->differs.from_colour;
     for (int a = 0; a < 3; a++) {
         if (more->low[a] < sums->low[a]) sums->low[a] = more->low[a];
         if (more->high[a] > sums->high[a]) sums->high[a] = more->high[a];
@@ -109,43 +111,42 @@ static void add_range(const mospt_grid *grid, lanes low, lanes high, prep_pack_s
     }
 }
 
-/* As pack_positions() for records of the same lattice. They are 16 bytes at least, and so are those
- * that are made: what is written behind the coordinates is written again by those who come after.
- */
+/* The vertices of records of the same lattice, which are 16 bytes at least.
+ * rgbi     [count][4] */
 MOSPT_WIDE static void pack_lattice(const mospt_grid *grid, const prep_packed *packed,
-                                    const uint8_t *from, uint32_t count, uint8_t *records,
-                                    size_t stride, prep_pack_sums *sums)
+                                    const uint8_t *from, const uint8_t *rgbi, uint32_t count,
+                                    uint8_t *records, size_t stride, prep_pack_sums *sums)
 {
     cells base = {(uint32_t)grid->base[0], (uint32_t)grid->base[1], (uint32_t)grid->base[2]};
     lanes low = load_lanes(from), high = low;
     for (uint32_t i = 0; i < count; i++, from += packed->stride, records += stride) {
         lanes v = load_lanes(from);
         cells cell = (cells)v - base;
+        uint32_t colour;
         low = pick(v < low, v, low);
         high = pick(v > high, v, high);
+        memcpy(&colour, rgbi + 4 * (size_t)i, sizeof colour);
+        cell[3] = colour;
         memcpy(records, &cell, sizeof cell);
     }
     add_range(grid, low, high, sums);
 }
 
-/* The same value in every row. */
-static void pack_constant(uint8_t *rows, size_t stride, uint32_t count, const void *value,
-                          size_t size)
+/* The same value for every point.
+ * out      [count] values */
+static void fill_plane(const uint8_t *value, size_t size, uint32_t count, uint8_t *out)
 {
     for (uint32_t i = 0; i < count; i++)
-        memcpy(rows + i * stride, value, size);
+        memcpy(out + i * size, value, size);
 }
 
 static void convert_plane(const uint8_t *plane, const mospt_attribute *from,
-                          const mospt_attribute *to, uint32_t count, uint8_t *rows, size_t stride)
+                          const mospt_attribute *to, uint32_t count, uint8_t *out)
 {
     size_t from_size = mospt_type_size(from->type), to_size = mospt_type_size(to->type);
-    for (uint32_t i = 0; i < count; i++)
-        for (uint32_t c = 0; c < from->components; c++)
-            mospt_type_write(
-                to->type,
-                mospt_type_read(from->type, plane + (i * from->components + c) * from_size),
-                rows + i * stride + c * to_size);
+    for (uint32_t i = 0; i < count * from->components; i++)
+        mospt_type_write(to->type, mospt_type_read(from->type, plane + i * from_size),
+                         out + i * to_size);
 }
 
 static void copy_plane(const uint8_t *plane, size_t size, uint32_t count, uint8_t *rows,
@@ -178,119 +179,127 @@ static void copy_plane(const uint8_t *plane, size_t size, uint32_t count, uint8_
     }
 }
 
-/* Where the planes of a dataset come from. */
+/* Where the attributes of a dataset come from. */
 typedef struct {
-    int plane[MOSPT_ATTRIBUTES_MAX]; /* of the batch; -1: a constant */
-    uint8_t scan[8];                 /* the value of the attribute of that name */
-    int scan_attribute;
+    int plane[MOSPT_ATTRIBUTES_MAX]; /* of the scan; -1: it has none of that name */
+    int scan;                        /* the attribute that is the number of the scan; -1: none */
+    uint8_t scan_value[8];
 } origins;
 
 static origins find_origins(const prep_packer *p)
 {
-    origins o = {.scan_attribute = mospt_schema_find(p->schema, "scan")};
+    origins o = {.scan = mospt_schema_find(p->schema, "scan")};
     for (uint32_t k = 0; k < p->schema->count; k++)
         o.plane[k] = mospt_schema_find(p->planes, p->schema->at[k].name);
-    if (o.scan_attribute >= 0)
-        mospt_type_write(p->schema->at[o.scan_attribute].type, p->scan, o.scan);
+    if (o.scan >= 0) mospt_type_write(p->schema->at[o.scan].type, p->scan, o.scan_value);
     return o;
 }
 
-/* The rows of an attribute of the dataset. */
-static uint8_t *rows_of(const prep_packer *p, uint32_t k, uint8_t *records)
-{
-    return records + sizeof(mospt_vertex) + p->schema->at[k].offset;
-}
+/* A block of points in planes. */
+typedef struct {
+    const uint8_t *rgbi;
+    const uint8_t *plane[MOSPT_ATTRIBUTES_MAX]; /* of the scan */
+    uint8_t *spare; /* room for the planes of one attribute of the dataset */
+} block;
 
-/* An attribute that the scan does not have: its own number, or zeros. */
-static void pack_missing(const prep_packer *p, const origins *o, uint32_t k, uint32_t count,
-                         uint8_t *records, size_t stride)
+/* The plane of an attribute of the dataset: that of the scan, or one made in the room for it. */
+static const uint8_t *plane_of(const prep_packer *p, const origins *o, const block *b, uint32_t k,
+                               uint32_t count)
 {
     static const uint8_t zero[255 * 8];
-    pack_constant(rows_of(p, k, records), stride, count,
-                  (int)k == o->scan_attribute ? o->scan : zero,
-                  mospt_attribute_size(&p->schema->at[k]));
+    const mospt_attribute *to = &p->schema->at[k];
+    if (o->plane[k] < 0) {
+        fill_plane((int)k == o->scan ? o->scan_value : zero, mospt_attribute_size(to), count,
+                   b->spare);
+        return b->spare;
+    }
+    const mospt_attribute *from = &p->planes->at[o->plane[k]];
+    if (from->type == to->type) return b->plane[o->plane[k]];
+    convert_plane(b->plane[o->plane[k]], from, to, count, b->spare);
+    return b->spare;
 }
 
-static bool is_converted(const prep_packer *p, const origins *o, uint32_t k)
-{
-    return o->plane[k] >= 0 && p->planes->at[o->plane[k]].type != p->schema->at[k].type;
-}
-
-/* A block of points in planes. */
-static void pack_planes(const prep_packer *p, const origins *o, const prep_batch *batch,
-                        uint32_t begin, uint32_t count, uint8_t *records, prep_pack_sums *sums)
+/* Attributes that are kept go into the records; the others are only looked at. */
+static void pack_attributes(const prep_packer *p, const origins *o, const block *b, uint32_t count,
+                            uint8_t *records, prep_pack_sums *sums)
 {
     size_t stride = mospt_record_size(p->schema);
-    pack_positions(p->grid, batch->xyz + 3 * (size_t)begin, count, records, stride, sums);
-    copy_plane(batch->rgbi + 4 * (size_t)begin, 4, count, records + offsetof(mospt_vertex, r),
-               stride);
     for (uint32_t k = 0; k < p->schema->count; k++) {
-        int from = o->plane[k];
-        if (from < 0) {
-            pack_missing(p, o, k, count, records, stride);
-            continue;
-        }
-        const uint8_t *plane = batch->plane[from] + begin * batch->plane_size[from];
-        if (is_converted(p, o, k))
-            convert_plane(plane, &p->planes->at[from], &p->schema->at[k], count,
-                          rows_of(p, k, records), stride);
-        else copy_plane(plane, batch->plane_size[from], count, rows_of(p, k, records), stride);
+        const mospt_attribute *a = &p->schema->at[k];
+        const uint8_t *plane = plane_of(p, o, b, k, count);
+        if (a->storage == MOSPT_IN_PLANE)
+            copy_plane(plane, mospt_attribute_size(a), count,
+                       records + sizeof(mospt_vertex) + a->stored_offset, stride);
+        else prep_implied_look(a, k, plane, b->rgbi, count, &sums->differs);
     }
 }
 
-/* A block of points as their file has them, which are unpacked where the records want them. */
+/* A block of a batch in planes. */
+static void pack_planes(const prep_packer *p, const origins *o, const prep_batch *batch,
+                        uint32_t begin, uint32_t count, uint8_t *spare, uint8_t *records,
+                        prep_pack_sums *sums)
+{
+    size_t stride = mospt_record_size(p->schema);
+    block b = {.rgbi = batch->rgbi + 4 * (size_t)begin, .spare = spare};
+    for (uint32_t k = 0; k < batch->plane_count; k++)
+        b.plane[k] = batch->plane[k] + begin * batch->plane_size[k];
+    pack_positions(p->grid, batch->xyz + 3 * (size_t)begin, count, records, stride, sums);
+    copy_plane(b.rgbi, 4, count, records + offsetof(mospt_vertex, r), stride);
+    pack_attributes(p, o, &b, count, records, sums);
+}
+
+/* A block of a batch as its file has it, which is unpacked first. */
 static void pack_packed(const prep_packer *p, const origins *o, const prep_batch *batch,
-                        uint32_t begin, uint32_t count, uint8_t *records, prep_pack_sums *sums)
+                        uint32_t begin, uint32_t count, uint8_t *spare, uint8_t *records,
+                        prep_pack_sums *sums)
 {
     const prep_packed *packed = &batch->packed;
     const uint8_t *from = packed->records + begin * packed->stride;
     bool same_lattice = is_same_lattice(packed, p->grid);
     size_t stride = mospt_record_size(p->schema);
     double xyz[3 * BLOCK];
-    uint8_t scratch[SCRATCH_SIZE], *spare = scratch;
-    prep_places to = {.xyz = same_lattice ? NULL : xyz,
-                      .rgbi = records + offsetof(mospt_vertex, r),
-                      .rgbi_stride = stride};
+    uint8_t rgbi[4 * BLOCK];
+    prep_places to = {.xyz = same_lattice ? NULL : xyz, .rgbi = rgbi};
+    block b = {.rgbi = rgbi};
     for (uint32_t k = 0; k < p->schema->count; k++) {
         int plane = o->plane[k];
-        if (plane < 0) {
-            pack_missing(p, o, k, count, records, stride);
-            continue;
-        }
-        bool converted = is_converted(p, o, k);
-        to.plane[plane] = converted ? spare : rows_of(p, k, records);
-        to.plane_stride[plane] = converted ? batch->plane_size[plane] : stride;
-        spare += converted ? count * batch->plane_size[plane] : 0;
+        if (plane < 0) continue;
+        b.plane[plane] = to.plane[plane] = spare;
+        spare += count * batch->plane_size[plane];
     }
-    if (same_lattice) pack_lattice(p->grid, packed, from, count, records, stride, sums);
+    b.spare = spare;
     packed->unpack(packed->layout, from, count, &to);
-    for (uint32_t k = 0; k < p->schema->count; k++)
-        if (is_converted(p, o, k))
-            convert_plane(to.plane[o->plane[k]], &p->planes->at[o->plane[k]], &p->schema->at[k],
-                          count, rows_of(p, k, records), stride);
-    if (!same_lattice) pack_positions(p->grid, xyz, count, records, stride, sums);
+    if (same_lattice) {
+        pack_lattice(p->grid, packed, from, rgbi, count, records, stride, sums);
+    } else {
+        pack_positions(p->grid, xyz, count, records, stride, sums);
+        copy_plane(rgbi, 4, count, records + offsetof(mospt_vertex, r), stride);
+    }
+    pack_attributes(p, o, &b, count, records, sums);
 }
 
-/* As many points as have room for what is converted of them. */
-static uint32_t block_size(const prep_packer *p, const origins *o)
+/* As many points as have room for all planes of the scan, and one of the dataset. */
+static uint32_t block_size(const prep_packer *p)
 {
-    size_t size = 0;
+    size_t size = p->planes->row_size, widest = 1;
     for (uint32_t k = 0; k < p->schema->count; k++)
-        if (is_converted(p, o, k)) size += mospt_attribute_size(&p->planes->at[o->plane[k]]);
-    return size * BLOCK <= SCRATCH_SIZE ? BLOCK : (uint32_t)(SCRATCH_SIZE / size);
+        if (mospt_attribute_size(&p->schema->at[k]) > widest)
+            widest = mospt_attribute_size(&p->schema->at[k]);
+    size += widest;
+    return size * BLOCK <= SPARE_SIZE ? BLOCK : (uint32_t)(SPARE_SIZE / size);
 }
 
 void prep_pack(const prep_packer *p, const prep_batch *batch, uint32_t begin, uint32_t end,
-               uint8_t *records, prep_pack_sums *sums, prep_implied *implied)
+               uint8_t *records, prep_pack_sums *sums)
 {
+    uint8_t spare[SPARE_SIZE];
     size_t stride = mospt_record_size(p->schema);
     origins from = find_origins(p);
-    uint32_t block = block_size(p, &from);
+    uint32_t most = block_size(p);
     for (uint32_t i = begin, n; i < end && !sums->outside; i += n, records += n * stride) {
-        n = end - i < block ? end - i : block;
-        if (batch->packed.unpack != NULL) pack_packed(p, &from, batch, i, n, records, sums);
-        else pack_planes(p, &from, batch, i, n, records, sums);
+        n = end - i < most ? end - i : most;
+        if (batch->packed.unpack != NULL) pack_packed(p, &from, batch, i, n, spare, records, sums);
+        else pack_planes(p, &from, batch, i, n, spare, records, sums);
         sums->hash += mospt_hash_records(records, stride, n);
-        prep_implied_look(implied, p->schema, records, n);
     }
 }

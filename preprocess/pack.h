@@ -6,9 +6,9 @@
 #include "preprocess/implied.h"
 
 typedef struct {
-    const mospt_grid *grid; /* borrowed */
-    const mospt_schema
-        *schema; /* borrowed, of the dataset; it has the attributes of the scan and "scan" */
+    const mospt_grid *grid;     /* borrowed */
+    const mospt_schema *schema; /* borrowed, of the dataset; its attributes have the types of those
+                                   of the scan, or wider ones */
     const mospt_schema *planes; /* borrowed, of the scan */
     uint32_t scan;              /* index of the source */
 } prep_packer;
@@ -19,6 +19,7 @@ typedef struct {
     double position_error;    /* metres */
     uint32_t low[3], high[3]; /* grid coordinates; low > high while there are no points */
     bool outside;             /* a point was outside the root cube: nothing of this batch counts */
+    prep_differing differs;   /* from what the schema says of attributes that are not in planes */
 } prep_pack_sums;
 
 extern const prep_pack_sums prep_pack_sums_empty;
@@ -27,7 +28,6 @@ void prep_pack_sums_add(prep_pack_sums *sums, const prep_pack_sums *more);
 /* Packs points [begin, end) of a batch.
  * records  out, [end - begin][mospt_record_size()]
  * sums     these points are added to them
- * implied  is to look at them
  * threads  any */
 void prep_pack(const prep_packer *packer, const prep_batch *batch, uint32_t begin, uint32_t end,
-               uint8_t *records, prep_pack_sums *sums, prep_implied *implied);
+               uint8_t *records, prep_pack_sums *sums);

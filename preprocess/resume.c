@@ -29,14 +29,13 @@ static void read_node(prep_resume *r, uint32_t i, uint8_t *payload)
 {
     const mospt_dataset *d = r->dataset;
     const mospt_node *n = &d->hierarchy.nodes[i];
-    mospt_vertex *vertices = (mospt_vertex *)(void *)payload;
-    uint8_t *attributes = payload + mospt_dataset_vertices_size(d, i);
-    if (!mospt_dataset_read_vertices(d, i, vertices, NULL) ||
-        !mospt_dataset_read_attributes(d, i, vertices, attributes, NULL))
+    uint8_t *planes = payload + mospt_dataset_vertices_size(d, i);
+    if (!mospt_dataset_read_vertices(d, i, (mospt_vertex *)(void *)payload, NULL) ||
+        !mospt_dataset_read_planes(d, i, planes, NULL))
         return;
     r->kept[i].is_there = true;
     r->kept[i].points_hash =
-        mospt_payload_points_hash(&d->metadata.schema, payload, attributes, n->count);
+        mospt_payload_points_hash(&d->metadata.schema, payload, planes, n->count);
 }
 
 /* Job: a thread's share, into memory that it uses again and again. Without any, nothing is there.

@@ -8,7 +8,7 @@ target_link_libraries(core_tools PUBLIC flags mospt prep PkgConfig::CMOCKA)
 
 foreach(name
         err schema grid cell hierarchy linear payload metadata sink dataset
-        arena implied sort spool workers plan solve pass dedupe frame build pose inspect)
+        arena attributes implied sort spool workers plan solve pass dedupe frame build pose inspect)
     add_executable(test_${name} test_${name}.c)
     target_link_libraries(test_${name} PRIVATE core_tools)
     add_test(NAME ${name} COMMAND test_${name})

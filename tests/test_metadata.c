@@ -252,9 +252,10 @@ static char *replaced(const char *text, size_t size, const char *what, const cha
 static void a_liar_with_the_right_checksum_is_refused(void **state)
 {
     static const char *const lies[][2] = {
-        {"\"version\": 3", "\"version\": 1"},
-        {"\"version\": 3", "\"version\": 4"},
-        {"\"version\": 3", "\"version\": \"3\""},
+        {"\"version\": 4", "\"version\": 1"},
+        {"\"version\": 4", "\"version\": 3"},
+        {"\"version\": 4", "\"version\": 5"},
+        {"\"version\": 4", "\"version\": \"4\""},
         {"\"0001027f80feff09\"", "\"0001027f80feff\""},
         {"\"0001027f80feff09\"", "\"0001027f80feff0900\""},
         {"\"0001027f80feff09\"", "\"0001027f80feff0x\""},
@@ -348,7 +349,7 @@ static void what_the_version_before_wrote_is_read(void **state)
         mospt_schema_keep(&m.schema, k, MOSPT_IN_PLANE, NULL);
     CORE_NEED(mospt_metadata_write(&m, folder, &err));
     char *text = (char *)core_file_read(path, &size);
-    char *old = replaced(text, size - TAIL, "\"version\": 3", "\"version\": 2", &new_size);
+    char *old = replaced(text, size - TAIL, "\"version\": 4", "\"version\": 2", &new_size);
     write_signed(old, new_size);
     CORE_NEED(mospt_metadata_read(folder, &back, &err));
     assert_int_equal(back.schema.stored_size, back.schema.row_size);

@@ -18,7 +18,6 @@ typedef struct {
     uint8_t *records; /* [COUNT][stride] */
     size_t stride;
     prep_pack_sums sums;
-    prep_implied implied;
     bool was_packed;
 } packed;
 
@@ -65,8 +64,7 @@ static packed pack(const char *path, const prep_scan_options *options, bool take
         if (batch.count == 0) break;
         p.was_packed = p.was_packed || batch.packed.unpack != NULL;
         assert_true(done + batch.count <= COUNT);
-        prep_pack(&packer, &batch, 0, batch.count, p.records + done * p.stride, &p.sums,
-                  &p.implied);
+        prep_pack(&packer, &batch, 0, batch.count, p.records + done * p.stride, &p.sums);
         done += batch.count;
     }
     prep_batch_fini(&batch);
@@ -105,9 +103,8 @@ static void assert_same(const packed *a, const packed *b)
     assert_true(a->sums.position_error == b->sums.position_error);
     assert_memory_equal(a->sums.low, b->sums.low, sizeof a->sums.low);
     assert_memory_equal(a->sums.high, b->sums.high, sizeof a->sums.high);
-    assert_true(a->implied.has_points && b->implied.has_points);
-    assert_true(a->implied.varies == b->implied.varies);
-    assert_true(a->implied.off_colour == b->implied.off_colour);
+    assert_true(a->sums.differs.in_value == b->sums.differs.in_value);
+    assert_true(a->sums.differs.from_colour == b->sums.differs.from_colour);
 }
 
 static void check(const char *path, const mospt_grid *grid, const mospt_schema *schema)
