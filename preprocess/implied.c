@@ -1,6 +1,7 @@
 #include "preprocess/implied.h"
 
 #include "mospt/turn.h"
+#include "mospt/wide.h"
 
 #include <string.h>
 
@@ -25,7 +26,7 @@ static bool is_constant(const mospt_attribute *a, const uint8_t *plane, uint32_t
 }
 
 /* The colours of four points fill a row, and twice as much, without intensity, one and a half. */
-static bool is_of_colour(const uint8_t *plane, const uint8_t *rgbi, uint32_t count)
+MOSPT_WIDE static bool is_of_colour(const uint8_t *plane, const uint8_t *rgbi, uint32_t count)
 {
     enum { POINTS = 4, HALF = MOSPT_TURN / 2, SIZE = 6 };
     mospt_row differences = {0};
