@@ -38,7 +38,7 @@ void cli_report_announcement(uint64_t points, uint64_t scratch_bytes, uint64_t o
     cli_bytes_text(scratch_bytes, scratch);
     if (again)
         fprintf(stderr,
-                "They have less in common than the first of them, and are read once more.\n");
+                "They have less in common than those looked at first, and are read once more.\n");
     fprintf(stderr, "%s points: the dataset takes %s", cli_grouped(points, number), output);
     if (scratch_bytes > 0) fprintf(stderr, ", and up to %s of scratch space", scratch);
     fprintf(stderr, "\n");

@@ -56,8 +56,8 @@ static common common_of(const prep_source_scan *scan, uint32_t number, const mos
     }
     const mospt_attribute *from = &scan->info.attributes.at[k];
     size_t from_size = mospt_type_size(from->type), to_size = mospt_type_size(to->type);
-    c.is_colour = from->type == to->type && !(scan->differs.from_colour >> k & 1);
-    c.is_constant = from->storage == MOSPT_CONSTANT && !(scan->differs.in_value >> k & 1) &&
+    c.is_colour = from->type == to->type && !(scan->info.differs.from_colour >> k & 1);
+    c.is_constant = from->storage == MOSPT_CONSTANT && !(scan->info.differs.in_value >> k & 1) &&
                     mospt_attribute_can_be(to, MOSPT_CONSTANT);
     for (uint32_t i = 0; c.is_constant && i < to->components; i++)
         mospt_type_write(to->type, mospt_type_read(from->type, from->constant + i * from_size),
@@ -73,7 +73,7 @@ static void keep_common(const prep_source *source, mospt_schema *schema, uint32_
          is_colour = mospt_attribute_can_be(a, MOSPT_OF_COLOUR), is_first = true;
     common first = {0};
     for (uint32_t i = 0; i < source->scan_count; i++) {
-        if (!source->scans[i].was_looked_at) continue;
+        if (!source->scans[i].info.was_looked_at) continue;
         common c = common_of(&source->scans[i], i, a);
         if (is_first) first = c;
         is_first = false;

@@ -183,7 +183,7 @@ typedef enum {
     TRY_DONE,
     TRY_OUTSIDE, /* a point was outside the root cube, which header bounds have promised not to
                     happen: start again */
-    TRY_DIFFERS, /* points have less in common than the first ones: start again, with a schema that
+    TRY_DIFFERS, /* points have less in common than those looked at: start again, with a schema that
                     now says what all have */
 } outcome;
 

@@ -38,8 +38,8 @@ typedef struct {
     /* Told often, by one thread at a time; returns false to stop. NULL: none. */
     bool (*progress)(void *context, const prep_progress *progress);
     /* Told before the points are read: points (0: unknown), and the scratch space that may be
-     * needed. And `again` if they have less in common than the first of them, so that they are read
-     * once more. */
+     * needed. And `again` if they have less in common than those looked at first, so that they are
+     * read once more. */
     void (*announce)(void *context, uint64_t points, uint64_t scratch_bytes, uint64_t output_bytes,
                      bool again);
     void *context;

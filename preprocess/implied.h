@@ -3,8 +3,8 @@
  *
  * A scan without classification says 0 ten million times, and most scanners' 16-bit colours are 8
  * bits twice. Such a thing is written once, into metadata.json; what is read from the dataset has
- * it again. It is guessed from the first points of each scan, so that not even the builder has to
- * carry it, and holds if no point differs. */
+ * it again. It is guessed from some points of each scan, so that not even the builder has to carry
+ * it, and holds if no point differs. */
 #pragma once
 #include "mospt/schema.h"
 

@@ -100,6 +100,7 @@ static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample
 {
     const prep_las_header *h = &las->header;
     sample_places places = choose_places(las);
+    if (!prep_las_sample_init(sample, h, places.looks, err)) return false;
     size_t want = places.looks > 0 ? PREP_TONE_SAMPLES / places.looks : 0;
     if (want > LOOK_SIZE / h->record_length) want = LOOK_SIZE / h->record_length;
     uint8_t *records = malloc(want * h->record_length + 1);
@@ -113,6 +114,26 @@ static bool take_sample(prep_scan *scan, las_state *las, prep_las_sample *sample
     }
     free(records);
     return ok;
+}
+
+/* What the points of a sample have in common, the others may have, too. */
+static bool look_at_sample(prep_scan *scan, const las_state *las, const prep_las_sample *sample,
+                           mospt_err *err)
+{
+    enum { POINTS = 256 };
+    prep_batch batch;
+    if (!prep_batch_init(&batch, &scan->info.attributes, POINTS, err)) return false;
+    for (size_t i = 0, n; i < sample->kept_count; i += n) {
+        n = sample->kept_count - i < POINTS ? sample->kept_count - i : POINTS;
+        batch.count = 0;
+        prep_places places = prep_batch_places(&batch);
+        prep_las_unpack(&las->layout, sample->kept + i * las->header.record_length, (uint32_t)n,
+                        &places);
+        batch.count = (uint32_t)n;
+        prep_scan_look(&scan->info, &batch);
+    }
+    prep_batch_fini(&batch);
+    return true;
 }
 
 static bool open_chunks(prep_scan *scan, las_state *las, mospt_err *err)
@@ -175,10 +196,10 @@ static bool las_open(prep_scan *scan, uint32_t index, const prep_scan_options *o
             " more, which are left out",
             las->header.declared, unclaimed);
 
-    prep_las_sample sample;
-    if (!prep_las_sample_init(&sample, err)) return false;
+    prep_las_sample sample = {0};
     bool ok = take_sample(scan, las, &sample, err);
     if (ok) prep_las_layout_make(scan, &las->header, &sample, &las->layout);
+    ok = ok && look_at_sample(scan, las, &sample, err);
     prep_las_sample_fini(&sample);
     return ok;
 }

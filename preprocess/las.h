@@ -64,14 +64,18 @@ bool prep_las_header_read(prep_input *input, prep_las_header *out, mospt_err *er
 /* Bytes of a record of this format without extra bytes. */
 uint32_t prep_las_record_size(uint8_t point_format);
 
-/* What a sample of the records says about colour and intensity. */
+/* A sample of the records: what it says about colour and intensity, and some of them. */
 typedef struct {
     uint16_t rgb_max;
     double *intensity; /* [PREP_TONE_SAMPLES], owned, of the first records */
     size_t count;
+    uint8_t *kept; /* [kept_count][record_length], owned, of each look the first */
+    size_t kept_count, kept_of_look;
 } prep_las_sample;
 
-bool prep_las_sample_init(prep_las_sample *sample, mospt_err *err);
+/* looks    how often records will be added */
+bool prep_las_sample_init(prep_las_sample *sample, const prep_las_header *header, uint32_t looks,
+                          mospt_err *err);
 void prep_las_sample_fini(prep_las_sample *sample);
 void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header,
                          const uint8_t *records, size_t count);

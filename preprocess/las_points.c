@@ -15,6 +15,9 @@ enum { FIELD_COPY, FIELD_BITS, FIELD_FLAGS_OLD, FIELD_FLAGS_NEW };
 /* Records that are decoded field by field while they are in the first cache. */
 enum { BLOCK = 256 };
 
+/* Of a sample, so many records are kept at most: enough to tell what all have in common. */
+enum { KEPT_POINTS = 1024, KEPT_SIZE = 256 * 1024 };
+
 /* Described extra bytes beyond this are left out: no scanner writes them, and they multiply the
  * memory of every batch. */
 enum { EXTRA_ROW_MAX = 1024 };
@@ -27,16 +30,22 @@ static const struct {
     {22, 0, 0}, {22, 30, 0}, {22, 30, 36}, {22, 0, 0},  {22, 30, 36},
 };
 
-bool prep_las_sample_init(prep_las_sample *sample, mospt_err *err)
+bool prep_las_sample_init(prep_las_sample *sample, const prep_las_header *header, uint32_t looks,
+                          mospt_err *err)
 {
-    size_t size = PREP_TONE_SAMPLES * sizeof *sample->intensity;
-    *sample = (prep_las_sample){.intensity = malloc(size)};
-    return sample->intensity != NULL || mospt_err_nomem(err, size);
+    size_t kept = KEPT_SIZE / header->record_length;
+    if (kept > KEPT_POINTS) kept = KEPT_POINTS;
+    *sample = (prep_las_sample){.kept_of_look = looks > 0 ? kept / looks : 0};
+    sample->intensity = malloc(PREP_TONE_SAMPLES * sizeof *sample->intensity);
+    sample->kept = malloc(kept * header->record_length);
+    if (sample->intensity != NULL && sample->kept != NULL) return true;
+    prep_las_sample_fini(sample);
+    return mospt_err_nomem(err, KEPT_SIZE);
 }
 
 void prep_las_sample_fini(prep_las_sample *sample)
 {
-    free(sample->intensity);
+    free(sample->intensity), free(sample->kept);
     *sample = (prep_las_sample){0};
 }
 
@@ -44,8 +53,12 @@ void prep_las_sample_add(prep_las_sample *sample, const prep_las_header *header,
                          const uint8_t *records, size_t count)
 {
     uint32_t rgb_at = part[header->point_format].rgb;
+    size_t length = header->record_length,
+           kept = count < sample->kept_of_look ? count : sample->kept_of_look;
+    memcpy(sample->kept + sample->kept_count * length, records, kept * length);
+    sample->kept_count += kept;
     for (size_t i = 0; i < count; i++) {
-        const uint8_t *p = records + i * header->record_length;
+        const uint8_t *p = records + i * length;
         if (sample->count < PREP_TONE_SAMPLES)
             sample->intensity[sample->count++] = prep_le16(p + 12);
         for (uint32_t c = 0; rgb_at != 0 && c < 3; c++) {

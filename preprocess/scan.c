@@ -64,6 +64,17 @@ int prep_scan_add_attribute(prep_scan *scan, const char *name, mospt_type type, 
     return (int)schema->count - 1;
 }
 
+void prep_scan_look(prep_scan_info *info, const prep_batch *batch)
+{
+    mospt_schema *attributes = &info->attributes;
+    if (batch->count == 0) return;
+    if (!info->was_looked_at) prep_implied_begin(attributes, (const uint8_t *const *)batch->plane);
+    info->was_looked_at = true;
+    for (uint32_t k = 0; k < attributes->count; k++)
+        prep_implied_look(&attributes->at[k], k, batch->plane[k], batch->rgbi, batch->count,
+                          &info->differs);
+}
+
 double prep_scan_common_step(const double scale[3])
 {
     double least = fmin(scale[0], fmin(scale[1], scale[2]));

@@ -7,6 +7,7 @@
  * whatever the batch size. */
 #pragma once
 #include "preprocess/batch.h"
+#include "preprocess/implied.h"
 #include "preprocess/pose.h"
 #include "preprocess/scan_memory.h"
 
@@ -48,7 +49,14 @@ typedef struct {
     char crs[PREP_CRS_SIZE]; /* coordinate reference system: WKT, "EPSG:25832", or what the file
                                 says; "" if nothing */
     mospt_schema attributes; /* planes of its batches, in this order */
+    /* Some of its points were looked at: its attributes are said to be constant, as far as they can
+     * be, and `differs` has those that are not, or not their colour. */
+    bool was_looked_at;
+    prep_differing differs;
 } prep_scan_info;
+
+/* Looks at what points of a scan have in common. */
+void prep_scan_look(prep_scan_info *info, const prep_batch *batch);
 
 typedef struct prep_scan prep_scan; /* opaque; one thread at a time */
 

@@ -38,25 +38,13 @@ static bool add_scan(prep_source *s, const prep_folder_file *file, uint32_t inde
     return true;
 }
 
-/* Looks at what the points of a scan have in common. */
-static void look(prep_source_scan *scan, const prep_batch *batch)
-{
-    mospt_schema *attributes = &scan->info.attributes;
-    if (batch->count == 0) return;
-    if (!scan->was_looked_at) prep_implied_begin(attributes, (const uint8_t *const *)batch->plane);
-    scan->was_looked_at = true;
-    for (uint32_t k = 0; k < attributes->count; k++)
-        prep_implied_look(&attributes->at[k], k, batch->plane[k], batch->rgbi, batch->count,
-                          &scan->differs);
-}
-
-static bool look_at_first(prep_source_scan *scan, prep_scan *reader, mospt_err *err)
+/* Looks at the first points of a scan of which its reader has seen none. */
+static bool look_at_first(prep_scan_info *info, prep_scan *reader, mospt_err *err)
 {
     prep_batch batch;
     mospt_err why; /* whoever reads the scan will find it again */
-    if (!scan->info.has_bounds) return true;
-    if (!prep_batch_init(&batch, &scan->info.attributes, FIRST_POINTS, err)) return false;
-    if (prep_scan_read(reader, &batch, &why)) look(scan, &batch);
+    if (!prep_batch_init(&batch, &info->attributes, FIRST_POINTS, err)) return false;
+    if (prep_scan_read(reader, &batch, &why)) prep_scan_look(info, &batch);
     prep_batch_fini(&batch);
     return true;
 }
@@ -75,8 +63,9 @@ bool prep_source_open(const prep_folder_list *list, const prep_scan_options *opt
             if (prep_scan_open(list->files[f].path, i, &s.options, &scan, &why)) {
                 const prep_scan_info *info = prep_scan_describe(scan);
                 scans = info->scan_count;
-                ok = add_scan(&s, &list->files[f], i, info, err) &&
-                     look_at_first(&s.scans[s.scan_count - 1], scan, err);
+                ok = add_scan(&s, &list->files[f], i, info, err);
+                if (ok && info->has_bounds && !info->was_looked_at)
+                    ok = look_at_first(&s.scans[s.scan_count - 1].info, scan, err);
                 prep_scan_close(scan);
             } else {
                 ok = leave_out(&s, list->files[f].name, &why, err);
@@ -201,7 +190,7 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
                 scan->info.high[a] = fmax(scan->info.high[a], batch.xyz[3 * i + (uint32_t)a]);
             }
         take_samples(&samples, &batch);
-        look(scan, &batch);
+        prep_scan_look(&scan->info, &batch);
         if (keep && !spool_write(s, &batch, err)) goto done;
         scan->points += batch.count;
         *points += batch.count;
@@ -237,8 +226,8 @@ void prep_source_set_range(prep_source *s, const double low[3], const double hig
         free(scan->samples);
         scan->samples = NULL;
         scan->sample_count = 0;
-        scan->measured = scan->was_looked_at = false;
-        scan->differs = (prep_differing){0};
+        scan->measured = scan->info.was_looked_at = false;
+        scan->info.differs = (prep_differing){0};
         memset(&scan->damage, 0, sizeof scan->damage);
     }
 }

@@ -5,7 +5,6 @@
  * the scratch disk. */
 #pragma once
 #include "preprocess/folder.h"
-#include "preprocess/implied.h"
 #include "preprocess/scan.h"
 
 typedef struct {
@@ -16,8 +15,6 @@ typedef struct {
     double (*samples)[3]; /* [sample_count], owned: some of its points, evenly spread;
                              only if measured */
     uint32_t sample_count;
-    bool was_looked_at;     /* its attributes are said to be constant, as far as they can be; */
-    prep_differing differs; /* from that, of its first points, or of all if it was measured */
     uint64_t spool_offset, spool_size; /* of its batches in the spool; size 0: read the file */
     /* After it has been read: */
     uint64_t points;
@@ -43,7 +40,7 @@ typedef struct {
     uint64_t spool_size;
 } prep_source;
 
-/* Opens and describes every scan of the files, and looks at its first points unless all of them
+/* Opens and describes every scan of the files, and looks at some of its points unless all of them
  * will be measured. A file that cannot be read is left out, and is no error.
  * scratch  folder for what text says
  * errors   MOSPT_ENOMEM; MOSPT_ECANCELLED */

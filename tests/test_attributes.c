@@ -171,7 +171,7 @@ static void what_scans_have_in_common_is_known_before_they_are_read(void **state
 /* However many attributes differ, and wherever. */
 static void points_that_differ_late_cost_one_more_reading(void **state)
 {
-    static const uint32_t places[] = {4096, COUNT / 2, COUNT - 1};
+    static const uint32_t places[] = {1024, COUNT / 2, COUNT - 1};
     (void)state;
     for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
         write_las("a.las", 1);
@@ -199,7 +199,7 @@ static void what_differs_among_the_first_is_known(void **state)
 {
     (void)state;
     write_las("a.las", 1);
-    change("a.las", 4095, USER_AT, 9);
+    change("a.las", 1023, USER_AT, 9);
     assert_int_equal(build(&defaults), 1);
     mospt_dataset *d = open_output();
     assert_int_equal(storage_of(d, "user_data"), MOSPT_IN_PLANE);
