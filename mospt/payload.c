@@ -66,9 +66,7 @@ static void turn(const uint8_t *const *from, size_t offset, uint32_t count,
     for (uint32_t start = 0; start < count; start += MOSPT_TURN) {
         for (uint32_t i = 0; i < MOSPT_TURN; i++) /* what is behind the last one does not matter */
             memcpy(&rows[i], from[start + i < count ? start + i : start] + offset, MOSPT_TURN);
-        mospt_turn(rows);
-        for (uint32_t i = 0; i < MOSPT_TURN; i++)
-            memcpy(columns[i] + start, &rows[i], MOSPT_TURN);
+        mospt_turn(rows, columns[0] + start, BLOCK);
     }
 }
 

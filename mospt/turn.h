@@ -1,7 +1,9 @@
 /* mospt/turn.h - sixteen rows of sixteen bytes become columns, by the vector unit: how records are
  * taken apart, and put together, where their attributes have a byte or two each. */
 #pragma once
+#include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 enum { MOSPT_TURN = 16 };
 typedef uint8_t mospt_row __attribute__((vector_size(MOSPT_TURN)));
@@ -17,10 +19,14 @@ static inline void mospt_turn_step(const mospt_row *from, mospt_row *to)
     }
 }
 
-/* rows     [MOSPT_TURN]; out: byte k of row i is byte i of row k */
-static inline void mospt_turn(mospt_row *rows)
+/* rows     [MOSPT_TURN], which are used up
+ * columns  out, [MOSPT_TURN], `stride` bytes from one to the next: byte k of column i is byte i of
+ *          row k */
+static inline void mospt_turn(mospt_row *rows, uint8_t *columns, size_t stride)
 {
     mospt_row spare[MOSPT_TURN];
     mospt_turn_step(rows, spare), mospt_turn_step(spare, rows);
     mospt_turn_step(rows, spare), mospt_turn_step(spare, rows);
+    for (size_t i = 0; i < MOSPT_TURN; i++)
+        memcpy(columns + i * stride, &rows[i], MOSPT_TURN);
 }

@@ -304,9 +304,7 @@ static void turn(const uint8_t *p, size_t stride, uint32_t count, size_t at, col
     for (uint32_t start = 0; start < count; start += MOSPT_TURN) {
         for (uint32_t i = 0; i < MOSPT_TURN; i++) /* what is behind the last one does not matter */
             memcpy(&rows[i], p + (start + i < count ? start + i : start) * stride + at, MOSPT_TURN);
-        mospt_turn(rows);
-        for (uint32_t i = 0; i < MOSPT_TURN; i++)
-            memcpy(out->column[i] + start, &rows[i], MOSPT_TURN);
+        mospt_turn(rows, out->column[0] + start, BLOCK);
     }
 }
 
