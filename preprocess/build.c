@@ -343,7 +343,6 @@ static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, ou
 /* One try at the whole tree. */
 static bool build_tree(build *b, prep_pack_sums *of_scan, outcome *out, mospt_err *err)
 {
-    uint32_t spooled_slices = slices_of(PREP_BATCH_CAPACITY); /* of what text has said */
     b->shape = (prep_shape){.grid = &b->metadata->grid,
                             .schema = &b->metadata->schema,
                             .inner_depth = b->metadata->inner_depth,
@@ -366,8 +365,6 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, outcome *out, mospt_er
                          .resume = b->resume,
                          .report = tell_written,
                          .report_context = b};
-    if (b->result->source.spool_size > 0 && env.batch_slices < spooled_slices)
-        env.batch_slices = spooled_slices;
     ok = ok && run_passes(b, &env, of_scan, out, err);
     uint64_t scratch = b->result->source.spool_size;
     if (b->store != NULL) scratch += prep_store_scratch_peak(b->store);

@@ -10,7 +10,12 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { BATCHES = 3, SAMPLES = 256 /* of a scan */, FIRST_POINTS = 4096 };
+enum {
+    BATCHES = 3,
+    SAMPLES = 256, /* of a scan */
+    PIECE = 4096,  /* points that are measured, or looked at, or come back from the spool at a time:
+                      no batch is smaller, however little memory there is */
+};
 
 static bool leave_out(prep_source *s, const char *name, const mospt_err *why, mospt_err *err)
 {
@@ -43,7 +48,7 @@ static bool look_at_first(prep_scan_info *info, prep_scan *reader, mospt_err *er
 {
     prep_batch batch;
     mospt_err why; /* whoever reads the scan will find it again */
-    if (!prep_batch_init(&batch, &info->attributes, FIRST_POINTS, err)) return false;
+    if (!prep_batch_init(&batch, &info->attributes, PIECE, err)) return false;
     if (prep_scan_read(reader, &batch, &why)) prep_scan_look(info, &batch);
     prep_batch_fini(&batch);
     return true;
@@ -94,20 +99,22 @@ void prep_source_close(prep_source *s)
     *s = (prep_source){.spool_fd = -1};
 }
 
-/* The parts of a batch as they stand in the spool, after its count. */
-static bool move_batch(prep_source *s, prep_batch *batch, uint64_t *at, bool write, mospt_err *err)
+/* Points [first, first + count) of a batch as they stand in the spool, after their count. */
+static bool move_points(prep_source *s, prep_batch *batch, uint32_t first, uint32_t count,
+                        uint64_t *at, bool write, mospt_err *err)
 {
-    void *part[MOSPT_ATTRIBUTES_MAX + 2] = {batch->xyz, batch->rgbi};
+    uint8_t *part[MOSPT_ATTRIBUTES_MAX + 2] = {(uint8_t *)batch->xyz, batch->rgbi};
     size_t size[MOSPT_ATTRIBUTES_MAX + 2] = {24, 4};
     for (uint32_t k = 0; k < batch->plane_count; k++)
         part[k + 2] = batch->plane[k], size[k + 2] = batch->plane_size[k];
     for (uint32_t k = 0; k < batch->plane_count + 2; k++) {
-        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, *at, part[k],
-                                              size[k] * batch->count, err)
-                        : mospt_file_read_at(s->spool_fd, s->spool_folder, *at, part[k],
-                                             size[k] * batch->count, err);
+        uint8_t *bytes = part[k] + first * size[k];
+        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, *at, bytes,
+                                              size[k] * count, err)
+                        : mospt_file_read_at(s->spool_fd, s->spool_folder, *at, bytes,
+                                             size[k] * count, err);
         if (!ok) return false;
-        *at += size[k] * batch->count;
+        *at += size[k] * count;
     }
     return true;
 }
@@ -127,7 +134,7 @@ static bool spool_write(prep_source *s, prep_batch *batch, mospt_err *err)
                              sizeof batch->count, err))
         return false;
     s->spool_size += sizeof batch->count;
-    return move_batch(s, batch, &s->spool_size, true, err);
+    return move_points(s, batch, 0, batch->count, &s->spool_size, true, err);
 }
 
 /* Takes what a scan says of itself once it has been read to its end, or to its damage. */
@@ -172,7 +179,7 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
         scan->info.low[a] = INFINITY, scan->info.high[a] = -INFINITY;
     scan->points = 0;
     scan->spool_offset = s->spool_size;
-    if (!prep_batch_init(&batch, &scan->info.attributes, PREP_BATCH_CAPACITY, err)) goto done;
+    if (!prep_batch_init(&batch, &scan->info.attributes, PIECE, err)) goto done;
     samples.at = malloc(SAMPLES * sizeof *samples.at);
     if (samples.at == NULL) {
         mospt_err_nomem(err, SAMPLES * sizeof *samples.at);
@@ -311,21 +318,34 @@ static void hand_over(prep_stream *st)
     pthread_mutex_unlock(&st->lock);
 }
 
-static bool stream_spool(prep_stream *st, uint32_t index, mospt_err *err)
+/* Fills a batch with pieces from the spool.
+ * at       of the first of them; out: of the next */
+static bool read_pieces(prep_stream *st, prep_batch *batch, uint64_t *at, uint64_t end,
+                        mospt_err *err)
 {
     prep_source *s = st->source;
-    uint64_t at = s->scans[index].spool_offset, end = at + s->scans[index].spool_size;
+    batch->packed.unpack = NULL;
+    while (*at < end) {
+        uint32_t count;
+        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, *at, &count, sizeof count, err))
+            return false;
+        if (count > st->capacity - batch->count) return true;
+        *at += sizeof count;
+        if (!move_points(s, batch, batch->count, count, at, false, err)) return false;
+        batch->count += count;
+    }
+    return true;
+}
+
+static bool stream_spool(prep_stream *st, uint32_t index, mospt_err *err)
+{
+    const prep_source_scan *scan = &st->source->scans[index];
+    uint64_t at = scan->spool_offset, end = at + scan->spool_size;
     while (at < end) {
         slot *to = await_slot(st);
         if (to == NULL) return true;
-        uint32_t count;
-        if (!prepare(st, to, index, err)) return false;
-        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, at, &count, sizeof count, err))
+        if (!prepare(st, to, index, err) || !read_pieces(st, &to->batch, &at, end, err))
             return false;
-        at += sizeof count;
-        to->batch.count = count;
-        to->batch.packed.unpack = NULL;
-        if (!move_batch(s, &to->batch, &at, false, err)) return false;
         hand_over(st);
     }
     return true;
@@ -380,10 +400,7 @@ bool prep_stream_open(prep_source *source, uint32_t batch_capacity, prep_stream 
     prep_stream *st = calloc(1, sizeof *st);
     if (st == NULL) return mospt_err_nomem(err, sizeof *st);
     st->source = source;
-    /* What was spooled comes back in the batches in which it went. */
-    st->capacity = source->spool_size > 0 && batch_capacity < PREP_BATCH_CAPACITY
-                       ? PREP_BATCH_CAPACITY
-                       : batch_capacity;
+    st->capacity = batch_capacity > PIECE ? batch_capacity : PIECE;
     pthread_mutex_init(&st->lock, NULL);
     pthread_cond_init(&st->change, NULL);
     if (pthread_create(&st->thread, NULL, read_ahead, st) != 0) {
