@@ -1,50 +1,11 @@
 #include "mospt/payload.h"
 
 #include "mospt/hash.h"
+#include "mospt/strided.h"
 #include "mospt/turn.h"
 
 /* Points whose records are packed plane by plane while they are still in the first cache. */
 enum { BLOCK = 256 };
-
-/* Calls `copy` with a size that is a constant for the usual ones, so that each copy is a load and a
- * store. */
-#define WITH_CONSTANT_SIZE(size, copy)                                                             \
-    switch (size) {                                                                                \
-    case 1:                                                                                        \
-        copy(1);                                                                                   \
-        break;                                                                                     \
-    case 2:                                                                                        \
-        copy(2);                                                                                   \
-        break;                                                                                     \
-    case 4:                                                                                        \
-        copy(4);                                                                                   \
-        break;                                                                                     \
-    case 6:                                                                                        \
-        copy(6);                                                                                   \
-        break;                                                                                     \
-    case 8:                                                                                        \
-        copy(8);                                                                                   \
-        break;                                                                                     \
-    case 12:                                                                                       \
-        copy(12);                                                                                  \
-        break;                                                                                     \
-    case 16:                                                                                       \
-        copy(16);                                                                                  \
-        break;                                                                                     \
-    default:                                                                                       \
-        copy(size);                                                                                \
-        break;                                                                                     \
-    }
-
-static void copy_strided(uint8_t *to, size_t to_stride, const uint8_t *from, size_t from_stride,
-                         size_t size, uint32_t count)
-{
-#define COPY(size)                                                                                 \
-    for (uint32_t i = 0; i < count; i++)                                                           \
-    memcpy(to + i * to_stride, from + i * from_stride, size)
-    WITH_CONSTANT_SIZE(size, COPY)
-#undef COPY
-}
 
 /* from     [count] records; what is copied stands at `offset` in each of them */
 static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_t size,
@@ -53,7 +14,7 @@ static void gather(uint8_t *to, const uint8_t *const *from, size_t offset, size_
 #define COPY(size)                                                                                 \
     for (uint32_t i = 0; i < count; i++)                                                           \
     memcpy(to + i * (size), from[i] + offset, size)
-    WITH_CONSTANT_SIZE(size, COPY)
+    MOSPT_WITH_CONSTANT_SIZE(size, COPY)
 #undef COPY
 }
 
@@ -114,14 +75,15 @@ static uint64_t hash_block(const mospt_schema *schema, const uint8_t *vertices,
     uint64_t sum = 0;
     for (; start < end; start += n) {
         n = end - start < room ? end - start : room;
-        copy_strided(records, stride, vertices + start * sizeof(mospt_vertex), sizeof(mospt_vertex),
-                     sizeof(mospt_vertex), n);
+        mospt_copy_strided(records, stride, vertices + start * sizeof(mospt_vertex),
+                           sizeof(mospt_vertex), sizeof(mospt_vertex), n);
         for (uint32_t k = 0; k < schema->count; k++) {
             const mospt_attribute *a = &schema->at[k];
             size_t size = mospt_attribute_size(a);
             if (a->storage != MOSPT_IN_PLANE) continue;
-            copy_strided(records + sizeof(mospt_vertex) + a->stored_offset, stride,
-                         planes + (size_t)count * a->stored_offset + start * size, size, size, n);
+            mospt_copy_strided(records + sizeof(mospt_vertex) + a->stored_offset, stride,
+                               planes + (size_t)count * a->stored_offset + start * size, size, size,
+                               n);
         }
         sum += mospt_hash_records(records, stride, n);
     }
@@ -165,8 +127,7 @@ uint64_t mospt_payload_pack(const mospt_schema *schema, const mospt_records *rec
 static void fill_constant(const mospt_attribute *a, uint32_t count, uint8_t *plane)
 {
     size_t size = mospt_attribute_size(a);
-    for (uint32_t i = 0; i < count; i++)
-        memcpy(plane + i * size, a->constant, size);
+    mospt_copy_strided(plane, size, a->constant, 0, size, count);
 }
 
 static void fill_of_colour(const mospt_vertex *vertices, uint32_t count, uint8_t *plane)

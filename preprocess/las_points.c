@@ -1,5 +1,6 @@
 #include "preprocess/las.h"
 
+#include "mospt/strided.h"
 #include "mospt/turn.h"
 #include "mospt/wide.h"
 #include "preprocess/bytes.h"
@@ -265,15 +266,7 @@ static void copy_wide(const prep_las_field *f, const uint8_t *p, size_t stride, 
                       uint8_t *out)
 {
     size_t size = f->size, row = size * f->components;
-    if (row == 6) /* colours: a load and a store */
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(out + i * 6, p + i * stride, 6);
-    else if (row == 8)
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(out + i * 8, p + i * stride, 8);
-    else
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(out + i * row, p + i * stride, row);
+    mospt_copy_strided(out, row, p, stride, row, count);
     if (!prep_host_is_big_endian()) return;
     for (size_t i = 0; i < count * row; i += size)
         for (size_t k = 0; k < size / 2; k++) {

@@ -1,6 +1,7 @@
 #include "preprocess/pack.h"
 
 #include "mospt/hash.h"
+#include "mospt/strided.h"
 #include "mospt/wide.h"
 #include "preprocess/bytes.h"
 
@@ -136,8 +137,7 @@ MOSPT_WIDE static void pack_lattice(const mospt_grid *grid, const prep_packed *p
  * out      [count] values */
 static void fill_plane(const uint8_t *value, size_t size, uint32_t count, uint8_t *out)
 {
-    for (uint32_t i = 0; i < count; i++)
-        memcpy(out + i * size, value, size);
+    mospt_copy_strided(out, size, value, 0, size, count);
 }
 
 static void convert_plane(const uint8_t *plane, const mospt_attribute *from,
@@ -152,31 +152,7 @@ static void convert_plane(const uint8_t *plane, const mospt_attribute *from,
 static void copy_plane(const uint8_t *plane, size_t size, uint32_t count, uint8_t *rows,
                        size_t stride)
 {
-    switch (size) { /* constant sizes are one load and one store */
-    case 1:
-        for (uint32_t i = 0; i < count; i++)
-            rows[i * stride] = plane[i];
-        return;
-    case 2:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(rows + i * stride, plane + 2 * (size_t)i, 2);
-        return;
-    case 4:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(rows + i * stride, plane + 4 * (size_t)i, 4);
-        return;
-    case 6:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(rows + i * stride, plane + 6 * (size_t)i, 6);
-        return;
-    case 8:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(rows + i * stride, plane + 8 * (size_t)i, 8);
-        return;
-    default:
-        for (uint32_t i = 0; i < count; i++)
-            memcpy(rows + i * stride, plane + size * i, size);
-    }
+    mospt_copy_strided(rows, stride, plane, size, size, count);
 }
 
 /* Where the attributes of a dataset come from. */
