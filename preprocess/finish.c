@@ -450,7 +450,7 @@ bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_
 {
     size_t stride = mospt_record_size(env->shape->schema);
     uint32_t block_count = spool->block_count, filled = 0, n;
-    uint32_t most = PREP_PILE_MAX + env->shape->add_threshold,
+    uint32_t of_node = prep_pile_points(stride), most = of_node + env->shape->add_threshold,
              room = most + (1u << prep_store_block_shift(env->store));
     uint64_t left = spool->count;
     bool ok = true;
@@ -464,8 +464,8 @@ bool prep_finish_pile(const prep_pass_env *env, prep_spool *spool, const uint32_
             filled += n;
         }
         /* As prep_solve() does: a rest below the threshold is added to the last node. */
-        bool more = left > PREP_PILE_MAX && left - PREP_PILE_MAX >= env->shape->add_threshold;
-        uint32_t count = more ? PREP_PILE_MAX : (uint32_t)left;
+        bool more = left > of_node && left - of_node >= env->shape->add_threshold;
+        uint32_t count = more ? of_node : (uint32_t)left;
         ok = ok && finish_pile_node(env, corner, level, more, records, count, work, err);
         memmove(records, records + count * stride, (filled - count) * stride);
         filled -= count, left -= count, level++;

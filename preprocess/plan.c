@@ -34,10 +34,10 @@ static uint64_t slice_size(size_t record_size)
 
 /* Points of all nodes whose payloads are made at a time: a node has one in each of its finest
  * cells, and less than the threshold more in each octant; or it is a pile. */
-static uint64_t emitted_points(uint32_t inner_depth, uint32_t threads)
+static uint64_t emitted_points(uint32_t inner_depth, size_t record_size, uint32_t threads)
 {
-    uint64_t node = UINT64_C(1) << 3 * inner_depth;
-    if (node < PREP_PILE_MAX) node = PREP_PILE_MAX;
+    uint64_t node = UINT64_C(1) << 3 * inner_depth, pile = prep_pile_points(record_size);
+    if (node < pile) node = pile;
     return threads * (node + 8 * PREP_ADD_THRESHOLD);
 }
 
@@ -84,7 +84,8 @@ bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, u
      * one node for each thread. */
     uint64_t share = (memory - taken) / 8,
              given_back = cells + plan.batch_slices * slice_size(record_size),
-             finish = 4 * share + given_back, emitted = emitted_points(inner_depth, threads);
+             finish = 4 * share + given_back,
+             emitted = emitted_points(inner_depth, record_size, threads);
     size_t solve_size = prep_finish_size(record_size, 1),
            emit_size = prep_finish_emit_size(record_size, 1);
     plan.solve_points = finish / (solve_size + emit_size);

@@ -110,17 +110,25 @@ static bool keep(const solver *s, const part *p, uint8_t child_mask, uint32_t ce
     return true;
 }
 
-/* All points at one position: the first PREP_PILE_MAX of them that arrived, then a child with the
- * next, and so on. */
+uint32_t prep_pile_points(size_t record_size)
+{
+    size_t fit = PREP_PILE_SIZE / record_size;
+    if (fit < PREP_ADD_THRESHOLD) return PREP_ADD_THRESHOLD;
+    return fit < PREP_PILE_MAX ? (uint32_t)fit : PREP_PILE_MAX;
+}
+
+/* All points at one position: as many of them as a node may have, in the order in which they
+ * arrived, then a child with the next, and so on. */
 static bool solve_pile(const solver *s, part p, prep_subtree *made, mospt_err *err)
 {
     uint64_t *keys = keys_of(s, &p);
+    uint32_t most = prep_pile_points(mospt_record_size(s->shape->schema));
     for (uint32_t i = 0; i < p.count; i++)
         keys[i] = (uint64_t)index_of(s, keys[i]);
     prep_sort_keys(keys, room_of(s, &p), p.count, 0);
     while (p.count > 0) {
         uint32_t n = p.count;
-        if (n > PREP_PILE_MAX && n - PREP_PILE_MAX >= s->shape->add_threshold) n = PREP_PILE_MAX;
+        if (n > most && n - most >= s->shape->add_threshold) n = most;
         if (!keep(s, &p, n < p.count ? 1 : 0, s->sorter.index_bits, keys_of(s, &p), n, made, err))
             return false;
         p.first += n, p.count -= n, p.level++;

@@ -11,10 +11,12 @@
 
 enum {
     PREP_ADD_THRESHOLD = 4096, /* default: a child has at least so many points */
-    PREP_PILE_MAX =
-        1
-        << 18, /* points of one node whose cube is one step wide, so that all are at one position */
+    PREP_PILE_MAX = 1 << 18,   /* points of a node of a pile, at most, */
+    PREP_PILE_SIZE = 6 << 20,  /* and bytes of their records */
 };
+
+/* Most points of a node of a pile, whose cube is one step wide, so that all are at one position. */
+uint32_t prep_pile_points(size_t record_size);
 
 typedef struct {
     const mospt_grid *grid;     /* borrowed */

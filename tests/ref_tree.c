@@ -41,7 +41,7 @@ static void build_node(const prep_shape *shape, size_t stride, const uint32_t co
 
     for (uint32_t i = 0; i < input->count; i++) {
         /* A node one step wide has only one cell: it takes a pile of points as it comes. */
-        bool to_pile = bits == 0 && i < PREP_PILE_MAX;
+        bool to_pile = bits == 0 && i < prep_pile_points(stride);
         if (!ref_mospt_insert(m, input->at[i], !to_pile))
             append(&rejected[octant_of(input->at[i], bits)], input->at[i]);
     }

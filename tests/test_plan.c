@@ -11,9 +11,11 @@ static const uint64_t MIB = UINT64_C(1) << 20;
 
 /* A node has at most a point in each finest cell and less than the threshold more in each octant,
  * or is a pile; no more points are made into payloads than are being finished. */
-static uint64_t emit_points(const prep_plan *p, uint32_t depth, uint32_t threads)
+static uint64_t emit_points(const prep_plan *p, size_t record_size, uint32_t depth,
+                            uint32_t threads)
 {
-    uint64_t cells = UINT64_C(1) << 3 * depth, pile = PREP_PILE_MAX + PREP_ADD_THRESHOLD,
+    uint64_t cells = UINT64_C(1) << 3 * depth,
+             pile = prep_pile_points(record_size) + PREP_ADD_THRESHOLD,
              node = cells + 8 * PREP_ADD_THRESHOLD, all;
     all = threads * (node > pile ? node : pile);
     return all < p->solve_points ? all : p->solve_points;
@@ -32,7 +34,8 @@ static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, 
     uint64_t in_pass = prep_pass_cells_size(p->levels, depth) +
                        (uint64_t)p->batch_slices * PREP_PASS_SLICE * 2 * record_size;
     uint64_t in_finish =
-        p->solve_memory + prep_finish_emit_size(record_size, emit_points(p, depth, threads));
+        p->solve_memory +
+        prep_finish_emit_size(record_size, emit_points(p, record_size, depth, threads));
     assert_true(store + in_pass <= memory);
     assert_true(store + in_finish <= memory);
 }
