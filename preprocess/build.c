@@ -4,6 +4,7 @@
 #include "preprocess/attributes.h"
 #include "preprocess/dedupe.h"
 #include "preprocess/feed.h"
+#include "preprocess/feed_scans.h"
 #include "preprocess/finish.h"
 #include "preprocess/frame.h"
 #include "preprocess/generations.h"
@@ -84,6 +85,13 @@ static bool tell_points(void *context, uint64_t points)
     return tell(context, points);
 }
 
+static bool tell_fed(void *context, uint64_t points, bool only_looks)
+{
+    build *b = context;
+    if (only_looks && b->phase == PREP_PHASE_READ) enter(b, PREP_PHASE_MEASURE);
+    return tell(b, points);
+}
+
 static bool tell_written(void *context)
 {
     build *b = context;
@@ -144,99 +152,6 @@ static bool plan_tree(build *b, bool again, mospt_err *err)
         return true;
     b->bypasses_cache = true;
     return mospt_writer_bypass_cache(b->writer, b->plan.chunk_size, err);
-}
-
-/* A batch of a scan on its way into the first pass. */
-typedef struct {
-    const prep_batch *batch;
-    prep_packer packer;
-    prep_pack_sums *sums; /* [slices] */
-    uint8_t *records;     /* [slices][PREP_PASS_SLICE][record], of points that are only looked at;
-                             owned; NULL: none are */
-} packing;
-
-static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
-{
-    packing *p = context;
-    uint32_t begin = slice * PREP_PASS_SLICE, left = p->batch->count - begin;
-    uint32_t count = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
-    p->sums[slice] = prep_pack_sums_empty;
-    prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice]);
-    return p->sums[slice].outside ? 0 : count;
-}
-
-/* Job: the same for points that go nowhere. */
-static void look_at_slice(void *context, uint32_t slice)
-{
-    packing *p = context;
-    size_t size = PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
-    pack_slice(p, slice, p->records + slice * size);
-}
-
-static uint32_t slices_of(uint32_t count)
-{
-    return (count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE;
-}
-
-/* How a try at the tree came out. */
-typedef enum {
-    TRY_DONE,
-    TRY_OUTSIDE, /* a point was outside the root cube, which header bounds have promised not to
-                    happen: start again */
-    TRY_DIFFERS, /* points have less in common than those looked at: start again, with a schema that
-                    now says what all have */
-} outcome;
-
-/* From now on points are only looked at. */
-static bool give_up_pass(build *b, prep_pass **pass, uint32_t batch_slices, packing *p,
-                         mospt_err *err)
-{
-    size_t size = batch_slices * PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
-    prep_pass_abandon(*pass);
-    *pass = NULL;
-    enter(b, PREP_PHASE_MEASURE);
-    p->records = malloc(size);
-    return p->records != NULL || mospt_err_nomem(err, size);
-}
-
-/* Streams all scans through the first pass.
- * pass     out: NULL if there is nothing to go on with */
-static bool stream_points(build *b, prep_pass **pass, uint32_t batch_slices,
-                          prep_pack_sums *of_scan, outcome *out, mospt_err *err)
-{
-    prep_source *source = &b->result->source;
-    mospt_schema *schema = &b->metadata->schema;
-    prep_stream *stream = NULL;
-    uint64_t points = 0;
-    prep_pack_sums all = prep_pack_sums_empty;
-    packing p = {.packer = {.grid = &b->metadata->grid, .schema = schema},
-                 .sums = malloc(batch_slices * sizeof *p.sums)};
-    bool ok = p.sums != NULL || mospt_err_nomem(err, batch_slices * sizeof *p.sums);
-    ok = ok && prep_stream_open(source, batch_slices * PREP_PASS_SLICE, &stream, err);
-    while (ok && !all.outside) {
-        uint32_t scan = 0;
-        ok = prep_stream_next(stream, &p.batch, &scan, err);
-        if (!ok || p.batch == NULL) break;
-        p.packer.planes = &source->scans[scan].info.attributes;
-        p.packer.scan = scan;
-        uint32_t slices = slices_of(p.batch->count);
-        if (*pass != NULL) ok = prep_pass_insert(*pass, slices, pack_slice, &p, err);
-        else prep_workers_run(b->workers, slices, look_at_slice, &p);
-        for (uint32_t i = 0; i < slices; i++) {
-            prep_pack_sums_add(&of_scan[scan], &p.sums[i]);
-            prep_pack_sums_add(&all, &p.sums[i]);
-        }
-        if (ok && *pass != NULL && !prep_implied_holds(schema, &all.differs))
-            ok = give_up_pass(b, pass, batch_slices, &p, err);
-        points += p.batch->count;
-        if (ok && !tell(b, points))
-            ok = mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
-    }
-    *out = all.outside ? TRY_OUTSIDE : *pass == NULL ? TRY_DIFFERS : TRY_DONE;
-    if (*out == TRY_DIFFERS) prep_implied_correct(schema, &all.differs);
-    prep_stream_close(stream);
-    free(p.sums), free(p.records);
-    return ok;
 }
 
 static bool measure(build *b, bool all, mospt_err *err)
@@ -315,15 +230,16 @@ static bool write_tree(build *b, prep_pass *pass, const prep_pack_sums *of_scan,
     return prep_generations_stop(generations, ok ? err : NULL) && ok;
 }
 
-static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, outcome *out,
-                       mospt_err *err)
+static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan,
+                       prep_feed_outcome *out, mospt_err *err)
 {
     const prep_source *source = &b->result->source;
     prep_pass *pass = NULL;
     enter(b, PREP_PHASE_READ);
     bool ok = prep_pass_begin(env, b->metadata->grid.root, 0, &pass, err) &&
-              stream_points(b, &pass, env->batch_slices, of_scan, out, err);
-    if (!ok || *out != TRY_DONE) {
+              prep_feed_scans(env, &b->result->source, &b->metadata->schema, tell_fed, b, &pass,
+                              of_scan, out, err);
+    if (!ok || *out != PREP_FEED_DONE) {
         prep_pass_abandon(pass);
         return ok;
     }
@@ -341,7 +257,7 @@ static bool run_passes(build *b, prep_pass_env *env, prep_pack_sums *of_scan, ou
 }
 
 /* One try at the whole tree. */
-static bool build_tree(build *b, prep_pack_sums *of_scan, outcome *out, mospt_err *err)
+static bool build_tree(build *b, prep_pack_sums *of_scan, prep_feed_outcome *out, mospt_err *err)
 {
     b->shape = (prep_shape){.grid = &b->metadata->grid,
                             .schema = &b->metadata->schema,
@@ -383,18 +299,18 @@ static bool try_until_done(build *b, prep_pack_sums *of_scan, mospt_err *err)
 {
     const prep_source *source = &b->result->source;
     bool is_measured = false, again = false;
-    for (outcome out = TRY_DIFFERS; out != TRY_DONE; again = true) {
+    for (prep_feed_outcome out = PREP_FEED_DIFFERS; out != PREP_FEED_DONE; again = true) {
         bool is_doubtful = false;
-        if (out == TRY_OUTSIDE && is_measured)
+        if (out == PREP_FEED_OUTSIDE && is_measured)
             return mospt_err_set(err, MOSPT_EIO, mospt_nowhere(),
                                  "the scans changed while they were read");
-        if (out == TRY_OUTSIDE && !measure(b, true, err)) return false;
-        if (out == TRY_DIFFERS && !plan_tree(b, again, err)) return false;
-        is_measured = is_measured || out == TRY_OUTSIDE;
+        if (out == PREP_FEED_OUTSIDE && !measure(b, true, err)) return false;
+        if (out == PREP_FEED_DIFFERS && !plan_tree(b, again, err)) return false;
+        is_measured = is_measured || out == PREP_FEED_OUTSIDE;
         for (uint32_t i = 0; i < source->scan_count; i++)
             of_scan[i] = prep_pack_sums_empty;
         if (!prep_frame_grid(source, &b->metadata->grid, &is_doubtful, err)) return false;
-        if (is_doubtful) out = TRY_OUTSIDE;
+        if (is_doubtful) out = PREP_FEED_OUTSIDE;
         else if (!build_tree(b, of_scan, &out, err)) return false;
     }
     return true;
