@@ -5,13 +5,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+size_t prep_batch_point_size(const mospt_schema *schema)
+{
+    return PREP_BATCH_XYZ_SIZE + PREP_BATCH_RGBI_SIZE + schema->row_size;
+}
+
 bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t capacity,
                      mospt_err *err)
 {
     prep_batch b = {.capacity = capacity, .plane_count = schema->count};
     bool ok = true;
-    b.xyz = malloc(capacity * 3 * sizeof *b.xyz);
-    b.rgbi = malloc((size_t)capacity * 4);
+    b.xyz = malloc((size_t)capacity * PREP_BATCH_XYZ_SIZE);
+    b.rgbi = malloc((size_t)capacity * PREP_BATCH_RGBI_SIZE);
     ok = b.xyz != NULL && b.rgbi != NULL;
     for (uint32_t k = 0; k < schema->count; k++) {
         b.plane_size[k] = mospt_attribute_size(&schema->at[k]);
@@ -20,7 +25,7 @@ bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t cap
     }
     if (!ok) {
         prep_batch_fini(&b);
-        return mospt_err_nomem(err, (size_t)capacity * (28 + schema->row_size));
+        return mospt_err_nomem(err, (size_t)capacity * prep_batch_point_size(schema));
     }
     *batch = b;
     return true;

@@ -42,6 +42,11 @@ typedef struct {
     uint32_t plane_count;
 } prep_batch;
 
+enum { PREP_BATCH_XYZ_SIZE = 3 * sizeof(double), PREP_BATCH_RGBI_SIZE = 4 };
+
+/* Bytes of a point in all planes of a batch. */
+size_t prep_batch_point_size(const mospt_schema *schema);
+
 /* Allocates a batch for points with the attributes of `schema`. */
 bool prep_batch_init(prep_batch *batch, const mospt_schema *schema, uint32_t capacity,
                      mospt_err *err);

@@ -276,6 +276,7 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, prep_feed_outcome *out
                          .writer = b->writer,
                          .divides = b->options->dedupe,
                          .levels = b->plan.levels,
+                         .slice_points = b->plan.slice_points,
                          .batch_slices = b->plan.batch_slices,
                          .solve_points = b->plan.solve_points,
                          .resume = b->resume,

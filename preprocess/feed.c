@@ -36,7 +36,7 @@ bool prep_feed_spool(const prep_pass_env *env, prep_pass *pass, prep_spool *spoo
     feed f = {.store = env->store,
               .spool = spool,
               .stride = mospt_record_size(env->shape->schema),
-              .blocks_per_slice = PREP_PASS_SLICE >> prep_store_block_shift(env->store)};
+              .blocks_per_slice = env->slice_points >> prep_store_block_shift(env->store)};
     uint32_t slices = (spool->block_count + f.blocks_per_slice - 1) / f.blocks_per_slice;
     bool ok = true;
     pthread_mutex_init(&f.lock, NULL);

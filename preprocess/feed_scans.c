@@ -5,17 +5,18 @@
 /* A batch of a scan on its way. */
 typedef struct {
     const prep_batch *batch;
+    uint32_t slice_points;
     prep_packer packer;
     prep_pack_sums *sums; /* [slices], owned */
-    uint8_t *records;     /* [slices][PREP_PASS_SLICE][record], of points that are only looked at;
+    uint8_t *records;     /* [slices][slice_points][record], of points that are only looked at;
                              owned; NULL: none are */
 } packing;
 
 static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
 {
     packing *p = context;
-    uint32_t begin = slice * PREP_PASS_SLICE, left = p->batch->count - begin;
-    uint32_t count = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
+    uint32_t begin = slice * p->slice_points, left = p->batch->count - begin;
+    uint32_t count = left < p->slice_points ? left : p->slice_points;
     p->sums[slice] = prep_pack_sums_empty;
     prep_pack(&p->packer, p->batch, begin, begin + count, records, &p->sums[slice]);
     return p->sums[slice].outside ? 0 : count;
@@ -25,19 +26,14 @@ static uint32_t pack_slice(void *context, uint32_t slice, uint8_t *records)
 static void look_at_slice(void *context, uint32_t slice)
 {
     packing *p = context;
-    size_t size = PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
+    size_t size = p->slice_points * mospt_record_size(p->packer.schema);
     pack_slice(p, slice, p->records + slice * size);
-}
-
-static uint32_t slices_of(uint32_t count)
-{
-    return (count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE;
 }
 
 /* From now on points are only looked at. */
 static bool give_up_pass(const prep_pass_env *env, prep_pass **pass, packing *p, mospt_err *err)
 {
-    size_t size = env->batch_slices * PREP_PASS_SLICE * mospt_record_size(p->packer.schema);
+    size_t size = env->batch_slices * env->slice_points * mospt_record_size(p->packer.schema);
     prep_pass_abandon(*pass);
     *pass = NULL;
     p->records = malloc(size);
@@ -48,7 +44,7 @@ static bool give_up_pass(const prep_pass_env *env, prep_pass **pass, packing *p,
 static bool feed_batch(const prep_pass_env *env, prep_pass *pass, packing *p, prep_pack_sums *all,
                        prep_pack_sums *of_scan, mospt_err *err)
 {
-    uint32_t slices = slices_of(p->batch->count);
+    uint32_t slices = (p->batch->count + p->slice_points - 1) / p->slice_points;
     bool ok = true;
     if (pass != NULL) ok = prep_pass_insert(pass, slices, pack_slice, p, err);
     else prep_workers_run(env->workers, slices, look_at_slice, p);
@@ -66,10 +62,11 @@ bool prep_feed_scans(const prep_pass_env *env, prep_source *source, mospt_schema
     prep_stream *stream = NULL;
     uint64_t points = 0;
     prep_pack_sums all = prep_pack_sums_empty;
-    packing p = {.packer = {.grid = env->shape->grid, .schema = schema},
+    packing p = {.slice_points = env->slice_points,
+                 .packer = {.grid = env->shape->grid, .schema = schema},
                  .sums = malloc(env->batch_slices * sizeof *p.sums)};
     bool ok = p.sums != NULL || mospt_err_nomem(err, env->batch_slices * sizeof *p.sums);
-    ok = ok && prep_stream_open(source, env->batch_slices * PREP_PASS_SLICE, &stream, err);
+    ok = ok && prep_stream_open(source, env->batch_slices * env->slice_points, &stream, err);
     while (ok && !all.outside) {
         uint32_t scan = 0;
         ok = prep_stream_next(stream, &p.batch, &scan, err);

@@ -22,12 +22,12 @@ typedef struct {
     uint32_t slice_count;
     void *memory; /* owned, of prep_pages_take(), for all that follows */
     size_t size;
-    uint32_t *codes;   /* [batch_slices][PREP_PASS_SLICE] */
+    uint32_t *codes;   /* [batch_slices][slice_points] */
     uint32_t *touched; /* [bucket_count]: buckets with records */
     uint32_t touched_count;
-    uint16_t *order;  /* [batch_slices][PREP_PASS_SLICE]: those of each bucket, in turn */
+    uint16_t *order;  /* [batch_slices][slice_points]: those of each bucket, in turn */
     uint16_t *begin;  /* [batch_slices][bucket_count + 1]: part of each bucket in that */
-    uint8_t *records; /* [batch_slices][PREP_PASS_SLICE][stride] */
+    uint8_t *records; /* [batch_slices][slice_points][stride] */
 } batch;
 
 struct prep_pass {
@@ -72,7 +72,7 @@ size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth)
 
 static bool batch_init(const prep_pass *p, batch *b, mospt_err *err)
 {
-    size_t records = (size_t)p->env->batch_slices * PREP_PASS_SLICE,
+    size_t records = (size_t)p->env->batch_slices * p->env->slice_points,
            parts = (size_t)p->env->batch_slices * (p->bucket_count + 1);
     b->size = records * (sizeof *b->codes + sizeof *b->order + p->stride) +
               p->bucket_count * sizeof *b->touched + parts * sizeof *b->begin;
@@ -158,7 +158,7 @@ void prep_pass_abandon(prep_pass *p)
 
 static uint8_t *records_of(const prep_pass *p, const batch *b, uint32_t slice)
 {
-    return b->records + (size_t)slice * PREP_PASS_SLICE * p->stride;
+    return b->records + (size_t)slice * p->env->slice_points * p->stride;
 }
 
 /* Parts of the buckets in the order of a slice. */
@@ -187,8 +187,9 @@ static void prepare_slice(prep_pass *p, uint32_t slice)
 {
     batch *b = p->preparing;
     uint8_t *records = records_of(p, b, slice);
-    uint32_t *codes = b->codes + (size_t)slice * PREP_PASS_SLICE;
-    uint16_t *order = b->order + (size_t)slice * PREP_PASS_SLICE, *begin = begin_of(p, b, slice);
+    uint32_t *codes = b->codes + (size_t)slice * p->env->slice_points;
+    uint16_t *order = b->order + (size_t)slice * p->env->slice_points,
+             *begin = begin_of(p, b, slice);
     uint32_t bits = mospt_cell_bits(p->env->shape->grid, p->level), levels = p->code_levels;
     uint32_t bucket_shift = 3 * (levels - p->levels);
     uint32_t count = p->prepare(p->context, slice, records);
@@ -267,8 +268,8 @@ static void fill_bucket(prep_pass *p, const batch *from, uint32_t b)
     }
     for (uint32_t s = 0; s < from->slice_count; s++) {
         const uint8_t *records = records_of(p, from, s);
-        const uint32_t *codes = from->codes + (size_t)s * PREP_PASS_SLICE;
-        const uint16_t *order = from->order + (size_t)s * PREP_PASS_SLICE,
+        const uint32_t *codes = from->codes + (size_t)s * p->env->slice_points;
+        const uint16_t *order = from->order + (size_t)s * p->env->slice_points,
                        *begin = begin_of(p, from, s);
         for (uint32_t i = begin[b]; i < begin[b + 1]; i++) {
             uint32_t j =
@@ -339,7 +340,7 @@ static bool run_round(prep_pass *p, batch *next, mospt_err *err)
     batch *from = p->prepared;
     uint32_t fills = from != NULL ? from->touched_count : 0;
     uint32_t slices = next != NULL ? next->slice_count : 0;
-    size_t batch_size = (size_t)slices * PREP_PASS_SLICE * p->stride;
+    size_t batch_size = (size_t)slices * p->env->slice_points * p->stride;
     p->preparing = next;
     p->untouched = prep_store_untouched(p->env->store, 2 * batch_size,
                                         prep_workers_count(p->env->workers) * (size_t)TOUCH_SIZE,

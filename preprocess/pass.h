@@ -21,7 +21,8 @@
 
 enum {
     PREP_PASS_LEVELS_MAX = 3,
-    PREP_PASS_SLICE = 4096, /* records that one thread prepares at a time: they fit its cache */
+    PREP_PASS_SLICE_MIN = 64,
+    PREP_PASS_SLICE_MAX = 4096,
 };
 
 /* Told now and then, by one thread at a time. Returns false to stop the build. */
@@ -35,6 +36,8 @@ typedef struct {
     prep_arena *arena;     /* for rejection files being finished */
     bool divides;          /* nothing is accepted: points are only divided among octants */
     uint32_t levels;       /* of the outer octree that one pass fills, 1 to PREP_PASS_LEVELS_MAX */
+    uint32_t slice_points; /* records that one thread prepares at a time: they fit its cache; a
+                              power of two, PREP_PASS_SLICE_MIN to PREP_PASS_SLICE_MAX */
     uint32_t batch_slices; /* that one call inserts at most */
     uint64_t solve_points; /* rejection files up to so many points are finished in one go */
     const prep_resume *resume; /* what need not be made again; NULL: nothing */
@@ -51,7 +54,7 @@ size_t prep_pass_cells_size(uint32_t levels, uint32_t inner_depth);
 bool prep_pass_begin(const prep_pass_env *env, const uint32_t corner[3], uint32_t level,
                      prep_pass **out, mospt_err *err);
 
-/* Writes the records of a slice of a batch, at most PREP_PASS_SLICE, all inside the node. Returns
+/* Writes the records of a slice of a batch, at most env->slice_points, all inside the node. Returns
  * how many. A job: it touches only what its index names. */
 typedef uint32_t (*prep_pass_prepare)(void *context, uint32_t slice, uint8_t *records);
 

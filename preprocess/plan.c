@@ -27,9 +27,9 @@ static uint64_t open_spools(uint32_t levels)
 }
 
 /* Bytes of a slice in the two batches of a pass and the four of the readers. */
-static uint64_t slice_size(size_t record_size)
+static uint64_t slice_size(size_t record_size, uint32_t points)
 {
-    return PREP_PASS_SLICE * (2 * (record_size + 6) + 4 * (record_size + 32));
+    return points * (2 * (record_size + 6) + 4 * (record_size + 32));
 }
 
 /* Points of all nodes whose payloads are made at a time: a node has one in each of its finest
@@ -41,62 +41,81 @@ static uint64_t emitted_points(uint32_t inner_depth, size_t record_size, uint32_
     return threads * (node + 8 * PREP_ADD_THRESHOLD);
 }
 
+/* What a pass holds while it is fed, and the chunks of the writer.
+ * returns  bytes of a slice in all batches */
+static uint64_t plan_pass(uint64_t memory, size_t record_size, uint32_t inner_depth,
+                          prep_plan *plan)
+{
+    uint64_t block_min = PREP_BLOCK_RECORDS_MIN * record_size;
+    if (block_min < BLOCK_MIN) block_min = BLOCK_MIN;
+    plan->levels = inner_depth < PREP_PASS_LEVELS_MAX ? inner_depth : PREP_PASS_LEVELS_MAX;
+    /* Codes of a pass are 32 bits. */
+    while (plan->levels > 1 && 3 * (plan->levels + inner_depth - 1) > 32)
+        plan->levels--;
+    while (plan->levels > 1 && (prep_pass_cells_size(plan->levels, inner_depth) > memory / 8 ||
+                                open_spools(plan->levels) * block_min > memory / 8))
+        plan->levels--;
+    uint64_t spools = open_spools(plan->levels), block = memory / 8 / spools;
+    if (block > BLOCK_MAX) block = BLOCK_MAX;
+    if (block < block_min) block = block_min;
+    plan->block_size = (size_t)block;
+    plan->spools_size = (size_t)(spools * block);
+
+    /* So few points a slice where they are wide that there are several. */
+    plan->slice_points = PREP_PASS_SLICE_MAX;
+    while (plan->slice_points > PREP_PASS_SLICE_MIN &&
+           slice_size(record_size, plan->slice_points) > memory / 32)
+        plan->slice_points /= 2;
+    uint64_t slice = slice_size(record_size, plan->slice_points), slices = memory / 16 / slice;
+    plan->batch_slices = (uint32_t)(slices < 1 ? 1 : slices > SLICES_MAX ? SLICES_MAX : slices);
+
+    plan->chunk_size = MOSPT_SINK_CHUNK_MIN;
+    while (plan->chunk_size < MOSPT_SINK_CHUNK_MAX && plan->chunk_size < memory / 1024)
+        plan->chunk_size *= 2;
+    return slice;
+}
+
+/* What rejection files that are being finished have, and what the store.
+ * left        bytes for both
+ * given_back  bytes that a pass had, which are there for the former on top */
+static void plan_finish(uint64_t left, uint64_t given_back, size_t record_size, uint64_t emitted,
+                        prep_plan *plan)
+{
+    /* While some of their points are being solved, as many may be on their way to the disk, or so
+     * many as are in one node for each thread. */
+    uint64_t share = left / 8, finish = 4 * share + given_back;
+    size_t solve_size = prep_finish_size(record_size, 1),
+           emit_size = prep_finish_emit_size(record_size, 1);
+    plan->solve_points = finish / (solve_size + emit_size);
+    if (plan->solve_points > emitted)
+        plan->solve_points = (finish - emitted * emit_size) / solve_size;
+    if (plan->solve_points > SOLVE_POINTS_MAX) plan->solve_points = SOLVE_POINTS_MAX;
+    if (emitted > plan->solve_points) emitted = plan->solve_points;
+    plan->solve_memory = (size_t)(plan->solve_points * solve_size);
+    /* The rest keeps points from going to the disk. */
+    finish = plan->solve_memory + emitted * emit_size;
+    plan->store_memory = (size_t)(7 * share - (finish > given_back ? finish - given_back : 0));
+}
+
 bool prep_plan_make(uint64_t memory, size_t record_size, uint32_t inner_depth, uint32_t threads,
                     prep_plan *out, mospt_err *err)
 {
-    prep_plan plan = {.levels = PREP_PASS_LEVELS_MAX};
-    if (plan.levels > inner_depth) plan.levels = inner_depth;
-    /* Codes of a pass are 32 bits. */
-    while (plan.levels > 1 && 3 * (plan.levels + inner_depth - 1) > 32)
-        plan.levels--;
-    while (plan.levels > 1 && (prep_pass_cells_size(plan.levels, inner_depth) > memory / 8 ||
-                               open_spools(plan.levels) * BLOCK_MIN > memory / 8))
-        plan.levels--;
-    uint64_t cells = prep_pass_cells_size(plan.levels, inner_depth),
-             spools = open_spools(plan.levels);
-
-    uint64_t block = memory / 8 / spools;
-    plan.block_size = (size_t)(block < BLOCK_MIN   ? BLOCK_MIN
-                               : block > BLOCK_MAX ? BLOCK_MAX
-                                                   : block);
-    plan.spools_size = (size_t)(spools * plan.block_size);
-    uint64_t slices = memory / 16 / slice_size(record_size);
-    plan.batch_slices = (uint32_t)(slices < 1 ? 1 : slices > SLICES_MAX ? SLICES_MAX : slices);
-
-    plan.chunk_size = MOSPT_SINK_CHUNK_MIN;
-    while (plan.chunk_size < MOSPT_SINK_CHUNK_MAX && plan.chunk_size < memory / 1024)
-        plan.chunk_size *= 2;
-
-    uint64_t taken = FIXED_SIZE + cells + plan.spools_size +
-                     plan.batch_slices * slice_size(record_size) +
-                     MOSPT_SINK_CHUNKS * plan.chunk_size;
+    prep_plan plan = {0};
+    uint64_t slice = plan_pass(memory, record_size, inner_depth, &plan);
+    uint64_t given_back =
+                 prep_pass_cells_size(plan.levels, inner_depth) + plan.batch_slices * slice,
+             taken =
+                 FIXED_SIZE + given_back + plan.spools_size + MOSPT_SINK_CHUNKS * plan.chunk_size,
+             least = ((taken + (taken >> 3)) >> 20) + 1;
     if (memory < (uint64_t)PREP_MEMORY_MIN_MIB << 20 || memory < taken + (taken >> 3))
         return mospt_err_set(
             err, MOSPT_EINVAL, mospt_nowhere(),
             "a memory limit of %llu MiB is too little: at inner depth %u it takes at least %llu "
             "MiB",
             (unsigned long long)(memory >> 20), inner_depth,
-            (unsigned long long)(((taken + (taken >> 3)) >> 20) + 1 > PREP_MEMORY_MIN_MIB
-                                     ? ((taken + (taken >> 3)) >> 20) + 1
-                                     : PREP_MEMORY_MIN_MIB));
-    /* When rejection files are finished, a pass has given back its cells and batches. While some of
-     * their points are being solved, as many may be on their way to the disk, or so many as are in
-     * one node for each thread. */
-    uint64_t share = (memory - taken) / 8,
-             given_back = cells + plan.batch_slices * slice_size(record_size),
-             finish = 4 * share + given_back,
-             emitted = emitted_points(inner_depth, record_size, threads);
-    size_t solve_size = prep_finish_size(record_size, 1),
-           emit_size = prep_finish_emit_size(record_size, 1);
-    plan.solve_points = finish / (solve_size + emit_size);
-    if (plan.solve_points > emitted)
-        plan.solve_points = (finish - emitted * emit_size) / solve_size;
-    if (plan.solve_points > SOLVE_POINTS_MAX) plan.solve_points = SOLVE_POINTS_MAX;
-    if (emitted > plan.solve_points) emitted = plan.solve_points;
-    plan.solve_memory = (size_t)(plan.solve_points * solve_size);
-    /* The rest keeps points from going to the disk. */
-    finish = plan.solve_memory + emitted * emit_size;
-    plan.store_memory = (size_t)(7 * share - (finish > given_back ? finish - given_back : 0));
+            (unsigned long long)(least > PREP_MEMORY_MIN_MIB ? least : PREP_MEMORY_MIN_MIB));
+    plan_finish(memory - taken, given_back, record_size,
+                emitted_points(inner_depth, record_size, threads), &plan);
     *out = plan;
     return true;
 }

@@ -6,7 +6,8 @@ enum { PREP_MEMORY_MIN_MIB = 64 };
 
 typedef struct {
     uint32_t levels;       /* of the outer octree that one pass fills */
-    uint32_t batch_slices; /* of PREP_PASS_SLICE records per batch */
+    uint32_t slice_points; /* records of a slice */
+    uint32_t batch_slices; /* of a batch */
     size_t block_size;     /* of spools, bytes, at most */
     size_t store_memory;   /* bytes of full blocks that stay in memory */
     size_t spools_size;    /* bytes of the blocks that a pass is filling, on top of that */

@@ -12,10 +12,17 @@
 
 enum {
     BATCHES = 3,
-    SAMPLES = 256, /* of a scan */
-    PIECE = 4096,  /* points that are measured, or looked at, or come back from the spool at a time:
-                      no batch is smaller, however little memory there is */
+    SAMPLES = 256,       /* of a scan */
+    MEASURED_MAX = 4096, /* points that are measured or looked at at a time, */
+    MEASURED_MIN = 64,
+    MEASURED_SIZE = 1 << 20, /* and bytes, where points are wide */
 };
+
+static uint32_t measured_points(const mospt_schema *attributes)
+{
+    size_t fit = MEASURED_SIZE / prep_batch_point_size(attributes);
+    return fit > MEASURED_MAX ? MEASURED_MAX : fit < MEASURED_MIN ? MEASURED_MIN : (uint32_t)fit;
+}
 
 static bool leave_out(prep_source *s, const char *name, const mospt_err *why, mospt_err *err)
 {
@@ -48,7 +55,8 @@ static bool look_at_first(prep_scan_info *info, prep_scan *reader, mospt_err *er
 {
     prep_batch batch;
     mospt_err why; /* whoever reads the scan will find it again */
-    if (!prep_batch_init(&batch, &info->attributes, PIECE, err)) return false;
+    if (!prep_batch_init(&batch, &info->attributes, measured_points(&info->attributes), err))
+        return false;
     if (prep_scan_read(reader, &batch, &why)) prep_scan_look(info, &batch);
     prep_batch_fini(&batch);
     return true;
@@ -99,27 +107,36 @@ void prep_source_close(prep_source *s)
     *s = (prep_source){.spool_fd = -1};
 }
 
-/* Points [first, first + count) of a batch as they stand in the spool, after their count. */
-static bool move_points(prep_source *s, prep_batch *batch, uint32_t first, uint32_t count,
-                        uint64_t *at, bool write, mospt_err *err)
+/* A batch as it stands in the spool: the number of its points, and their planes. */
+typedef struct {
+    uint64_t at;
+    uint32_t count;
+} piece;
+
+/* Moves points of a batch, from `first` on, to or from those of a piece, from `begin` on. */
+static bool move_points(prep_source *s, prep_batch *batch, uint32_t first, const piece *p,
+                        uint32_t begin, uint32_t count, bool write, mospt_err *err)
 {
-    uint8_t *part[MOSPT_ATTRIBUTES_MAX + 2] = {(uint8_t *)batch->xyz, batch->rgbi};
-    size_t size[MOSPT_ATTRIBUTES_MAX + 2] = {24, 4};
+    uint8_t *plane[MOSPT_ATTRIBUTES_MAX + 2] = {(uint8_t *)batch->xyz, batch->rgbi};
+    size_t size[MOSPT_ATTRIBUTES_MAX + 2] = {PREP_BATCH_XYZ_SIZE, PREP_BATCH_RGBI_SIZE};
+    uint64_t at = p->at + sizeof p->count;
     for (uint32_t k = 0; k < batch->plane_count; k++)
-        part[k + 2] = batch->plane[k], size[k + 2] = batch->plane_size[k];
+        plane[k + 2] = batch->plane[k], size[k + 2] = batch->plane_size[k];
     for (uint32_t k = 0; k < batch->plane_count + 2; k++) {
-        uint8_t *bytes = part[k] + first * size[k];
-        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, *at, bytes,
+        uint8_t *bytes = plane[k] + first * size[k];
+        uint64_t from = at + begin * size[k];
+        bool ok = write ? mospt_file_write_at(s->spool_fd, s->spool_folder, from, bytes,
                                               size[k] * count, err)
-                        : mospt_file_read_at(s->spool_fd, s->spool_folder, *at, bytes,
+                        : mospt_file_read_at(s->spool_fd, s->spool_folder, from, bytes,
                                              size[k] * count, err);
         if (!ok) return false;
-        *at += size[k] * count;
+        at += size[k] * p->count;
     }
     return true;
 }
 
-static bool spool_write(prep_source *s, prep_batch *batch, mospt_err *err)
+static bool spool_write(prep_source *s, const mospt_schema *attributes, prep_batch *batch,
+                        mospt_err *err)
 {
     if (s->spool_fd < 0) {
         char path[4096];
@@ -130,11 +147,10 @@ static bool spool_write(prep_source *s, prep_batch *batch, mospt_err *err)
                                  "no scratch file can be made there");
         unlink(path);
     }
-    if (!mospt_file_write_at(s->spool_fd, s->spool_folder, s->spool_size, &batch->count,
-                             sizeof batch->count, err))
-        return false;
-    s->spool_size += sizeof batch->count;
-    return move_points(s, batch, 0, batch->count, &s->spool_size, true, err);
+    piece p = {.at = s->spool_size, .count = batch->count};
+    s->spool_size += sizeof p.count + p.count * prep_batch_point_size(attributes);
+    return mospt_file_write_at(s->spool_fd, s->spool_folder, p.at, &p.count, sizeof p.count, err) &&
+           move_points(s, batch, 0, &p, 0, p.count, true, err);
 }
 
 /* Takes what a scan says of itself once it has been read to its end, or to its damage. */
@@ -179,7 +195,9 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
         scan->info.low[a] = INFINITY, scan->info.high[a] = -INFINITY;
     scan->points = 0;
     scan->spool_offset = s->spool_size;
-    if (!prep_batch_init(&batch, &scan->info.attributes, PIECE, err)) goto done;
+    if (!prep_batch_init(&batch, &scan->info.attributes, measured_points(&scan->info.attributes),
+                         err))
+        goto done;
     samples.at = malloc(SAMPLES * sizeof *samples.at);
     if (samples.at == NULL) {
         mospt_err_nomem(err, SAMPLES * sizeof *samples.at);
@@ -198,7 +216,7 @@ static bool measure_scan(prep_source *s, prep_source_scan *scan, uint64_t *point
             }
         take_samples(&samples, &batch);
         prep_scan_look(&scan->info, &batch);
-        if (keep && !spool_write(s, &batch, err)) goto done;
+        if (keep && !spool_write(s, &scan->info.attributes, &batch, err)) goto done;
         scan->points += batch.count;
         *points += batch.count;
         if (!report(context, *points)) {
@@ -318,21 +336,30 @@ static void hand_over(prep_stream *st)
     pthread_mutex_unlock(&st->lock);
 }
 
-/* Fills a batch with pieces from the spool.
- * at       of the first of them; out: of the next */
-static bool read_pieces(prep_stream *st, prep_batch *batch, uint64_t *at, uint64_t end,
-                        mospt_err *err)
+/* Where the points of a scan in the spool are read. */
+typedef struct {
+    uint64_t at, end; /* of the piece, of the last one */
+    uint32_t taken;   /* points of it */
+} cursor;
+
+/* Fills a batch from the spool, which may have been written in larger ones. */
+static bool read_spool(prep_stream *st, const mospt_schema *attributes, prep_batch *batch,
+                       cursor *from, mospt_err *err)
 {
     prep_source *s = st->source;
     batch->packed.unpack = NULL;
-    while (*at < end) {
-        uint32_t count;
-        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, *at, &count, sizeof count, err))
+    while (from->at < from->end && batch->count < st->capacity) {
+        piece p = {.at = from->at};
+        if (!mospt_file_read_at(s->spool_fd, s->spool_folder, p.at, &p.count, sizeof p.count, err))
             return false;
-        if (count > st->capacity - batch->count) return true;
-        *at += sizeof count;
-        if (!move_points(s, batch, batch->count, count, at, false, err)) return false;
-        batch->count += count;
+        uint32_t n = p.count - from->taken, room = st->capacity - batch->count;
+        if (n > room) n = room;
+        if (!move_points(s, batch, batch->count, &p, from->taken, n, false, err)) return false;
+        batch->count += n;
+        from->taken += n;
+        if (from->taken < p.count) continue;
+        from->at += sizeof p.count + p.count * prep_batch_point_size(attributes);
+        from->taken = 0;
     }
     return true;
 }
@@ -340,11 +367,12 @@ static bool read_pieces(prep_stream *st, prep_batch *batch, uint64_t *at, uint64
 static bool stream_spool(prep_stream *st, uint32_t index, mospt_err *err)
 {
     const prep_source_scan *scan = &st->source->scans[index];
-    uint64_t at = scan->spool_offset, end = at + scan->spool_size;
-    while (at < end) {
+    cursor from = {.at = scan->spool_offset, .end = scan->spool_offset + scan->spool_size};
+    while (from.at < from.end) {
         slot *to = await_slot(st);
         if (to == NULL) return true;
-        if (!prepare(st, to, index, err) || !read_pieces(st, &to->batch, &at, end, err))
+        if (!prepare(st, to, index, err) ||
+            !read_spool(st, &scan->info.attributes, &to->batch, &from, err))
             return false;
         hand_over(st);
     }
@@ -400,7 +428,7 @@ bool prep_stream_open(prep_source *source, uint32_t batch_capacity, prep_stream 
     prep_stream *st = calloc(1, sizeof *st);
     if (st == NULL) return mospt_err_nomem(err, sizeof *st);
     st->source = source;
-    st->capacity = batch_capacity > PIECE ? batch_capacity : PIECE;
+    st->capacity = batch_capacity;
     pthread_mutex_init(&st->lock, NULL);
     pthread_cond_init(&st->change, NULL);
     if (pthread_create(&st->thread, NULL, read_ahead, st) != 0) {

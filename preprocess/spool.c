@@ -3,6 +3,7 @@
 #include "mospt/file.h"
 #include "preprocess/pages.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <lz4.h>
@@ -15,6 +16,7 @@
 /* Memory for blocks comes from the system in slabs of so many bytes, of which only what is touched
  * counts. */
 enum { SLAB_SIZE = 64 << 20, RECORDS_MIN_SHIFT = 4 };
+static_assert(PREP_BLOCK_RECORDS_MIN == 1 << RECORDS_MIN_SHIFT, "a power of two");
 
 /* What a file system keeps a file in. */
 enum { DISK_UNIT = 4096 };

@@ -8,6 +8,8 @@
 #include "mospt/err.h"
 #include "mospt/point.h"
 
+enum { PREP_BLOCK_RECORDS_MIN = 16 };
+
 typedef struct prep_store prep_store;
 
 typedef struct {
@@ -27,7 +29,8 @@ typedef struct {
 /* folder       where the scratch file is made; it has no name there, so nothing is left behind by a
  *              killed process
  * record_size  bytes, at least those of a vertex
- * block_size   bytes, at most; a block holds a power of two of records, and at least 16
+ * block_size   bytes, at most; a block holds a power of two of records, and at least
+ *              PREP_BLOCK_RECORDS_MIN
  * memory_size  bytes of full blocks that stay in memory; the blocks that are being filled come on
  *              top */
 bool prep_store_create(const char *folder, size_t record_size, size_t block_size,

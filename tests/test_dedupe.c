@@ -116,6 +116,7 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
                          .arena = arena,
                          .divides = true,
                          .levels = y->levels,
+                         .slice_points = PREP_PASS_SLICE_MAX,
                          .batch_slices = 1,
                          .solve_points = y->solve_memory / prep_finish_size(site->stride, 1),
                          .report = go_on};

@@ -15,6 +15,7 @@
 typedef struct {
     uint32_t levels, threads, batch;
     size_t block_size, store_memory, solve_memory;
+    uint32_t slice; /* records; 0: as many as it can have */
     bool bypasses_cache;
 } way;
 
@@ -40,14 +41,14 @@ static bool go_on(void *context)
 /* Records [begin, begin + count) of a site as a batch. */
 typedef struct {
     const core_site *site;
-    uint32_t begin, count;
+    uint32_t begin, count, slice;
 } feed;
 
 static uint32_t feed_slice(void *context, uint32_t slice, uint8_t *records)
 {
     const feed *f = context;
-    uint32_t begin = slice * PREP_PASS_SLICE, left = f->count - begin;
-    uint32_t n = left < PREP_PASS_SLICE ? left : PREP_PASS_SLICE;
+    uint32_t begin = slice * f->slice, left = f->count - begin;
+    uint32_t n = left < f->slice ? left : f->slice;
     memcpy(records, f->site->records + (f->begin + begin) * f->site->stride, n * f->site->stride);
     return n;
 }
@@ -73,6 +74,7 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     if (w->bypasses_cache)
         assert_true(mospt_writer_bypass_cache(writer, MOSPT_SINK_CHUNK_MIN, err));
     if (stop != NULL) stop->writer = writer, stop->metadata = &metadata;
+    uint32_t slice = w->slice > 0 ? w->slice : PREP_PASS_SLICE_MAX;
     prep_arena *arena = NULL;
     assert_true(prep_arena_create(w->solve_memory, &arena, err));
     prep_pass_env env = {.shape = shape,
@@ -81,7 +83,8 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
                          .writer = writer,
                          .levels = w->levels,
                          .arena = arena,
-                         .batch_slices = (w->batch + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE,
+                         .slice_points = slice,
+                         .batch_slices = (w->batch + slice - 1) / slice,
                          .solve_points = w->solve_memory / prep_finish_size(site->stride, 1),
                          .resume = resume,
                          .report = go_on,
@@ -89,9 +92,8 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     bool ok = prep_pass_begin(&env, site->grid.root, 0, &pass, err);
     for (uint32_t i = 0; ok && i < site->count; i += w->batch) {
         uint32_t left = site->count - i;
-        feed f = {site, i, left < w->batch ? left : w->batch};
-        ok = prep_pass_insert(pass, (f.count + PREP_PASS_SLICE - 1) / PREP_PASS_SLICE, feed_slice,
-                              &f, err);
+        feed f = {site, i, left < w->batch ? left : w->batch, slice};
+        ok = prep_pass_insert(pass, (f.count + slice - 1) / slice, feed_slice, &f, err);
     }
     if (ok) ok = prep_pass_end(pass, err);
     else prep_pass_abandon(pass);
@@ -160,6 +162,7 @@ static void check_all_ways(const core_site *site, uint32_t depth, uint32_t thres
         w.threads = threads[n % 3], n /= 3;
         w.batch = batch[n % 3], n /= 3;
         w.block_size = block[n % 3];
+        w.slice = k % 2 == 0 ? 0 : 1024;
         check_ways(site, depth, threshold, &w, 1);
     }
 }
@@ -182,7 +185,11 @@ static void all_inner_depths_give_the_same_bytes(void **state)
         core_site site;
         core_site_make(CORE_CLUSTERED, 20, 4000, depth, &site);
         const way ways[] = {
-            {.levels = 1, .threads = 2, .batch = 500, .block_size = 300},
+            {.levels = 1,
+             .threads = 2,
+             .batch = 500,
+             .block_size = 300,
+             .slice = PREP_PASS_SLICE_MIN},
             {.levels = 2, .threads = 1, .batch = 4000, .block_size = 300, .solve_memory = 100000},
             {.levels = 3, .threads = 2, .batch = 1234, .block_size = 300, .store_memory = 2000},
         };

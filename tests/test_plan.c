@@ -32,7 +32,7 @@ static void check_plan(const prep_plan *p, uint64_t memory, size_t record_size, 
     assert_true(p->solve_points * prep_finish_size(record_size, 1) <= p->solve_memory);
     uint64_t store = buckets * (p->levels + 1) * p->block_size + p->store_memory;
     uint64_t in_pass = prep_pass_cells_size(p->levels, depth) +
-                       (uint64_t)p->batch_slices * PREP_PASS_SLICE * 2 * record_size;
+                       (uint64_t)p->batch_slices * p->slice_points * 2 * record_size;
     uint64_t in_finish =
         p->solve_memory +
         prep_finish_emit_size(record_size, emit_points(p, record_size, depth, threads));
@@ -108,7 +108,7 @@ static void a_block_of_a_spool_fits_a_slice(void **state)
             for (size_t record = 16; record < 400; record += 13) {
                 prep_plan plan;
                 if (prep_plan_make(memory, record, depth, 2, &plan, NULL))
-                    assert_true(plan.block_size / record <= PREP_PASS_SLICE);
+                    assert_true(plan.block_size / record <= plan.slice_points);
             }
 }
 
