@@ -142,9 +142,11 @@ static bool check_disks(build *b, bool again, mospt_err *err)
 /* Divides what there is among points with the attributes of the schema. */
 static bool plan_tree(build *b, bool again, mospt_err *err)
 {
-    const mospt_metadata *m = b->metadata;
-    if (!prep_plan_make(b->memory, mospt_record_size(&m->schema), m->inner_depth,
-                        prep_workers_count(b->workers), &b->plan, err) ||
+    mospt_metadata *m = b->metadata;
+    size_t record_size = mospt_record_size(&m->schema);
+    m->add_threshold = prep_add_threshold(record_size);
+    if (!prep_plan_make(b->memory, record_size, m->inner_depth, prep_workers_count(b->workers),
+                        &b->plan, err) ||
         !check_disks(b, again, err))
         return false;
     /* The page cache is left to others by what would be more than its share of it. */
@@ -340,7 +342,6 @@ static bool run(build *b, mospt_err *err)
 
     b->memory = o->memory > 0 ? o->memory : prep_plan_machine_memory() / 4;
     b->metadata->inner_depth = o->inner_depth > 0 ? o->inner_depth : PREP_INNER_DEPTH_DEFAULT;
-    b->metadata->add_threshold = PREP_ADD_THRESHOLD;
     if (!prep_output_choose(o->output, o->force, &b->output, err) || !choose_scratch(b, err))
         return false;
     /* A place that cannot be had is known before the scans are read. */

@@ -6,8 +6,10 @@
 
 enum {
     OCTANTS = 8,
-    BELOW_CUT = 5, /* levels: a cell at the cut has 8^5 finest cells */
-    CUT_MAX = 3,   /* but no more cells than a pass has octants */
+    BELOW_CUT = 5,       /* levels: a cell at the cut has 8^5 finest cells, */
+    CELL_SIZE = 4 << 20, /* or as few as have records of so many bytes at most, a point in each; */
+    CUT_MAX = 3,         /* but no more cells than a pass has octants, */
+    SPOOLS_SIZE = 8 << 20, /* or have blocks of so many bytes together */
     ALIGNMENT = 64,
 };
 
@@ -259,6 +261,10 @@ bool prep_large_node(const prep_pass_env *env, const prep_finish_part *part, mos
     large l = {.env = env, .part = part, .shape = *env->shape};
     l.cut = depth > BELOW_CUT ? depth - BELOW_CUT : 1;
     if (l.cut > CUT_MAX) l.cut = CUT_MAX;
+    while (l.cut < CUT_MAX && l.cut + MOSPT_DEPTH_MIN < depth &&
+           mospt_record_size(env->shape->schema) << 3 * (depth - l.cut) > CELL_SIZE &&
+           prep_store_block_size(env->store) << 3 * (l.cut + 1) <= SPOOLS_SIZE)
+        l.cut++;
     l.shape.inner_depth = depth - l.cut;
     l.cell_count = 1u << 3 * l.cut;
     l.cells = calloc(l.cell_count, sizeof *l.cells);

@@ -38,7 +38,7 @@ static uint64_t emitted_points(uint32_t inner_depth, size_t record_size, uint32_
 {
     uint64_t node = UINT64_C(1) << 3 * inner_depth, pile = prep_pile_points(record_size);
     if (node < pile) node = pile;
-    return threads * (node + 8 * PREP_ADD_THRESHOLD);
+    return threads * (node + 8 * prep_add_threshold(record_size));
 }
 
 /* What a pass holds while it is fed, and the chunks of the writer.

@@ -110,10 +110,15 @@ static bool keep(const solver *s, const part *p, uint8_t child_mask, uint32_t ce
     return true;
 }
 
+uint32_t prep_add_threshold(size_t record_size)
+{
+    size_t fit = PREP_ADD_SIZE / record_size;
+    return fit < PREP_ADD_THRESHOLD ? (uint32_t)fit : PREP_ADD_THRESHOLD;
+}
+
 uint32_t prep_pile_points(size_t record_size)
 {
     size_t fit = PREP_PILE_SIZE / record_size;
-    if (fit < PREP_ADD_THRESHOLD) return PREP_ADD_THRESHOLD;
     return fit < PREP_PILE_MAX ? (uint32_t)fit : PREP_PILE_MAX;
 }
 

@@ -10,10 +10,14 @@
 #include "preprocess/workers.h"
 
 enum {
-    PREP_ADD_THRESHOLD = 4096, /* default: a child has at least so many points */
+    PREP_ADD_THRESHOLD = 4096, /* points that a child has at least; */
+    PREP_ADD_SIZE = 4 << 20,   /* fewer where they are wide: bytes of their records */
     PREP_PILE_MAX = 1 << 18,   /* points of a node of a pile, at most, */
     PREP_PILE_SIZE = 6 << 20,  /* and bytes of their records */
 };
+
+/* The threshold of points that have not said another one. */
+uint32_t prep_add_threshold(size_t record_size);
 
 /* Most points of a node of a pile, whose cube is one step wide, so that all are at one position. */
 uint32_t prep_pile_points(size_t record_size);

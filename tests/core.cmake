@@ -17,7 +17,7 @@ endforeach()
 
 # The program itself. It is told where it is.
 if(TARGET instantpoints)
-    foreach(name e2e_cli e2e_many)
+    foreach(name e2e_cli e2e_many e2e_memory)
         add_executable(${name} ${name}.c)
         target_link_libraries(${name} PRIVATE core_tools PkgConfig::JANSSON)
         add_test(NAME ${name} COMMAND ${name} $<TARGET_FILE:instantpoints>)

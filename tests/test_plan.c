@@ -15,8 +15,8 @@ static uint64_t emit_points(const prep_plan *p, size_t record_size, uint32_t dep
                             uint32_t threads)
 {
     uint64_t cells = UINT64_C(1) << 3 * depth,
-             pile = prep_pile_points(record_size) + PREP_ADD_THRESHOLD,
-             node = cells + 8 * PREP_ADD_THRESHOLD, all;
+             pile = prep_pile_points(record_size) + prep_add_threshold(record_size),
+             node = cells + 8 * prep_add_threshold(record_size), all;
     all = threads * (node > pile ? node : pile);
     return all < p->solve_points ? all : p->solve_points;
 }

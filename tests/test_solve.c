@@ -130,7 +130,16 @@ static void nodes_of_piles_have_fewer_points_where_records_are_wide(void **state
     assert_int_equal(prep_pile_points(16), PREP_PILE_MAX);
     assert_int_equal(prep_pile_points(24), PREP_PILE_MAX);
     assert_int_equal(prep_pile_points(250), PREP_PILE_SIZE / 250);
-    assert_int_equal(prep_pile_points(16 + MOSPT_ROW_SIZE_MAX), PREP_ADD_THRESHOLD);
+    assert_int_equal(prep_pile_points(16 + MOSPT_ROW_SIZE_MAX), 383);
+}
+
+static void children_have_fewer_points_where_records_are_wide(void **state)
+{
+    (void)state;
+    assert_int_equal(prep_add_threshold(16), PREP_ADD_THRESHOLD);
+    assert_int_equal(prep_add_threshold(1024), PREP_ADD_THRESHOLD);
+    assert_int_equal(prep_add_threshold(4096), 1024);
+    assert_int_equal(prep_add_threshold(16 + MOSPT_ROW_SIZE_MAX), 255);
 }
 
 static void many_copies_of_few_points_are_solved(void **state)
@@ -245,6 +254,7 @@ int main(void)
         cmocka_unit_test(deep_trees_need_more_levels_than_one_code_holds),
         cmocka_unit_test(piles_are_cut_into_nodes_of_at_most_pile_max),
         cmocka_unit_test(nodes_of_piles_have_fewer_points_where_records_are_wide),
+        cmocka_unit_test(children_have_fewer_points_where_records_are_wide),
         cmocka_unit_test(many_copies_of_few_points_are_solved),
         cmocka_unit_test(all_threads_together_solve_like_one),
         cmocka_unit_test(one_node_is_made_of_all_the_points_given),
