@@ -6,10 +6,10 @@
 
 enum {
     OCTANTS = 8,
-    BELOW_CUT = 5,       /* levels: a cell at the cut has 8^5 finest cells, */
-    CELL_SIZE = 4 << 20, /* or as few as have records of so many bytes at most, a point in each; */
-    CUT_MAX = 3,         /* but no more cells than a pass has octants, */
-    SPOOLS_SIZE = 8 << 20, /* or have blocks of so many bytes together */
+    BELOW_CUT = 5,         /* levels, at most: a cell at the cut has 8^5 finest cells */
+    CUT_MAX = 3,           /* levels above it: there are no more cells than a pass has octants */
+    CELL_SIZE = 4 << 20,   /* bytes of a cell with a point in each of its finest cells, */
+    SPOOLS_SIZE = 8 << 20, /* where the blocks of all cells take no more than that */
     ALIGNMENT = 64,
 };
 
@@ -255,17 +255,24 @@ static bool make_node(large *l, mospt_err *err)
            mospt_err_set(err, MOSPT_ECANCELLED, mospt_nowhere(), "stopped");
 }
 
+/* As few cells as may be, of which one is little beside the memory that there is. */
+static uint32_t choose_cut(const prep_pass_env *env)
+{
+    uint32_t depth = env->shape->inner_depth, cut = depth > BELOW_CUT ? depth - BELOW_CUT : 1;
+    size_t record_size = mospt_record_size(env->shape->schema),
+           block_size = prep_store_block_size(env->store);
+    if (cut > CUT_MAX) cut = CUT_MAX;
+    while (cut < CUT_MAX && cut + MOSPT_DEPTH_MIN < depth &&
+           record_size << 3 * (depth - cut) > CELL_SIZE &&
+           block_size << 3 * (cut + 1) <= SPOOLS_SIZE)
+        cut++;
+    return cut;
+}
+
 bool prep_large_node(const prep_pass_env *env, const prep_finish_part *part, mospt_err *err)
 {
-    uint32_t depth = env->shape->inner_depth;
-    large l = {.env = env, .part = part, .shape = *env->shape};
-    l.cut = depth > BELOW_CUT ? depth - BELOW_CUT : 1;
-    if (l.cut > CUT_MAX) l.cut = CUT_MAX;
-    while (l.cut < CUT_MAX && l.cut + MOSPT_DEPTH_MIN < depth &&
-           mospt_record_size(env->shape->schema) << 3 * (depth - l.cut) > CELL_SIZE &&
-           prep_store_block_size(env->store) << 3 * (l.cut + 1) <= SPOOLS_SIZE)
-        l.cut++;
-    l.shape.inner_depth = depth - l.cut;
+    large l = {.env = env, .part = part, .shape = *env->shape, .cut = choose_cut(env)};
+    l.shape.inner_depth = env->shape->inner_depth - l.cut;
     l.cell_count = 1u << 3 * l.cut;
     l.cells = calloc(l.cell_count, sizeof *l.cells);
     if (l.cells == NULL) return mospt_err_nomem(err, l.cell_count * sizeof *l.cells);

@@ -66,7 +66,7 @@ static void the_least_memory_is_enough_for_usual_points(void **state)
 {
     (void)state;
     for (uint32_t depth = MOSPT_DEPTH_MIN; depth <= 7; depth++)
-        for (size_t record = 18; record < 100; record += 9) {
+        for (size_t record = 18; record <= 1024; record += 1 + record / 4) {
             prep_plan plan;
             mospt_err err = {0};
             CORE_NEED(prep_plan_make(PREP_MEMORY_MIN_MIB * MIB, record, depth, 2, &plan, &err));
@@ -105,7 +105,7 @@ static void a_block_of_a_spool_fits_a_slice(void **state)
     (void)state;
     for (uint64_t memory = 64 * MIB; memory <= 64 * 1024 * MIB; memory *= 2)
         for (uint32_t depth = 1; depth <= MOSPT_DEPTH_MAX; depth++)
-            for (size_t record = 16; record < 400; record += 13) {
+            for (size_t record = 16; record < 16 + MOSPT_ROW_SIZE_MAX; record += record / 16) {
                 prep_plan plan;
                 if (prep_plan_make(memory, record, depth, 2, &plan, NULL))
                     assert_true(plan.block_size / record <= plan.slice_points);
