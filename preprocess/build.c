@@ -280,6 +280,7 @@ static bool build_tree(build *b, prep_pack_sums *of_scan, prep_feed_outcome *out
                          .levels = b->plan.levels,
                          .slice_points = b->plan.slice_points,
                          .batch_slices = b->plan.batch_slices,
+                         .emit_memory = b->plan.emit_memory,
                          .solve_points = b->plan.solve_points,
                          .resume = b->resume,
                          .report = tell_written,

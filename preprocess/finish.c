@@ -26,7 +26,8 @@ typedef struct {
 
 typedef struct {
     const prep_pass_env *env;
-    uint32_t item_count;
+    uint32_t item_count, threads;
+    size_t buffer_kept; /* bytes: a larger buffer is given back after its node */
 
     pthread_mutex_t lock;
     pthread_cond_t change;
@@ -40,10 +41,9 @@ typedef struct {
 } line;
 
 /* Points of a rejection file that all threads solve together. */
-enum { SHARED_MIN = 1 << 20 };
+enum { SHARED_MIN = 1 << 20, BUFFER_KEPT_MAX = 8 << 20 };
 
-/* One thread's memory for the payload of a node; of a large one it is given back at once. */
-enum { BUFFER_KEPT_SIZE = 8 << 20 };
+/* One thread's memory for the payload of a node. */
 typedef struct {
     void *memory; /* [size], owned, of prep_pages_take() */
     size_t size;
@@ -201,9 +201,9 @@ static void drop_buffer(buffer *b)
     *b = (buffer){0};
 }
 
-static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, uint64_t *hash,
-                      mospt_err *err)
+static bool emit_node(const line *l, item *i, uint32_t n, buffer *b, uint64_t *hash, mospt_err *err)
 {
+    const prep_pass_env *env = l->env;
     if (i->kept != MOSPT_NO_NODE) {
         *hash = prep_resume_points_hash(env->resume, i->made.nodes[n].first);
         return true;
@@ -212,14 +212,14 @@ static bool emit_node(const prep_pass_env *env, item *i, uint32_t n, buffer *b, 
     if (size > b->size) {
         drop_buffer(b);
         /* What is not touched takes no room. */
-        if (size < BUFFER_KEPT_SIZE) size = BUFFER_KEPT_SIZE;
+        if (size < l->buffer_kept) size = l->buffer_kept;
         b->memory = prep_pages_take(size);
         if (b->memory == NULL) return mospt_err_nomem(err, size);
         b->size = size;
     }
     *hash = prep_solve_emit(env->shape, &i->records, &i->made, n, b->memory);
     bool ok = mospt_writer_write(env->writer, &i->made.nodes[n].node, b->memory, err);
-    if (b->size > BUFFER_KEPT_SIZE) drop_buffer(b);
+    if (b->size > l->buffer_kept) drop_buffer(b);
     return ok;
 }
 
@@ -266,14 +266,14 @@ static bool step(line *l, buffer *b, mospt_err *err, bool *ok)
 {
     /* Parts are solved ahead, so that while one thread is busy with a large one there are nodes to
      * be made for the others. */
-    bool ahead = l->in_flight > prep_workers_count(l->env->workers);
+    bool ahead = l->in_flight > l->threads;
     item *i = ahead ? next_to_emit(l) : NULL, *solving = i == NULL ? next_to_solve(l) : NULL;
     if (i == NULL && solving == NULL) i = next_to_emit(l);
     if (i != NULL) {
         uint32_t n = i->nodes_taken++;
         uint64_t hash = 0;
         pthread_mutex_unlock(&l->lock);
-        *ok = emit_node(l->env, i, n, b, &hash, err);
+        *ok = emit_node(l, i, n, b, &hash, err);
         pthread_mutex_lock(&l->lock);
         *ok = *ok && settle_node(l, i, n, hash, err);
     } else if (solving != NULL) {
@@ -315,10 +315,19 @@ static void work_on_line(void *context, uint32_t thread)
 /* Takes over the items. */
 static bool run_line(const prep_pass_env *env, item *items, uint32_t item_count, mospt_err *err)
 {
-    line l = {.env = env, .items = items, .item_count = item_count};
+    uint32_t threads = prep_workers_count(env->workers);
+    if (threads > env->emit_memory / PREP_FINISH_BUFFER_MIN)
+        threads = (uint32_t)(env->emit_memory / PREP_FINISH_BUFFER_MIN);
+    if (threads == 0) threads = 1;
+    size_t share = env->emit_memory / threads;
+    line l = {.env = env,
+              .items = items,
+              .item_count = item_count,
+              .threads = threads,
+              .buffer_kept = share < BUFFER_KEPT_MAX ? share : BUFFER_KEPT_MAX};
     pthread_mutex_init(&l.lock, NULL);
     pthread_cond_init(&l.change, NULL);
-    prep_workers_run(env->workers, prep_workers_count(env->workers), work_on_line, &l);
+    prep_workers_run(env->workers, threads, work_on_line, &l);
     pthread_cond_destroy(&l.change);
     pthread_mutex_destroy(&l.lock);
     for (uint32_t i = 0; i < item_count; i++)

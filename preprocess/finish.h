@@ -23,6 +23,10 @@ typedef struct {
     uint32_t spool_count;
 } prep_finish_list;
 
+/* Memory comes in huge pages, so that a thread takes this for payloads however small they are:
+ * there are no more threads than env->emit_memory has room for. */
+enum { PREP_FINISH_BUFFER_MIN = 2 << 20 };
+
 /* Bytes of memory that finishing so many points in one go takes. */
 size_t prep_finish_size(size_t record_size, uint64_t count);
 

@@ -39,6 +39,7 @@ typedef struct {
     uint32_t slice_points; /* records that one thread prepares at a time: they fit its cache; a
                               power of two, PREP_PASS_SLICE_MIN to PREP_PASS_SLICE_MAX */
     uint32_t batch_slices; /* that one call inserts at most */
+    size_t emit_memory;    /* bytes for the payloads of their nodes */
     uint64_t solve_points; /* rejection files up to so many points are finished in one go */
     const prep_resume *resume; /* what need not be made again; NULL: nothing */
     prep_pass_report report;

@@ -93,7 +93,8 @@ static void plan_finish(uint64_t left, uint64_t given_back, size_t record_size, 
     if (emitted > plan->solve_points) emitted = plan->solve_points;
     plan->solve_memory = (size_t)(plan->solve_points * solve_size);
     /* The rest keeps points from going to the disk. */
-    finish = plan->solve_memory + emitted * emit_size;
+    plan->emit_memory = (size_t)(emitted * emit_size);
+    finish = plan->solve_memory + plan->emit_memory;
     plan->store_memory = (size_t)(7 * share - (finish > given_back ? finish - given_back : 0));
 }
 

@@ -12,6 +12,7 @@ typedef struct {
     size_t store_memory;   /* bytes of full blocks that stay in memory */
     size_t spools_size;    /* bytes of the blocks that a pass is filling, on top of that */
     size_t solve_memory;   /* bytes for rejection files being finished */
+    size_t emit_memory;    /* bytes for the payloads that are being made of them */
     uint64_t solve_points; /* of a rejection file that is finished in one go, at most */
     size_t chunk_size;     /* in which payloads are written past the page cache */
 } prep_plan;

@@ -1,6 +1,7 @@
 /* The memory that the builder was given is the peak of the whole process, however wide its points
- * are and however they lie, and does not show in the bytes. argv[1] is the program; where that is
- * built with sanitizers, which take memory of their own, only the bytes are compared. */
+ * are, however they lie, and however many threads there are, and does not show in the bytes.
+ * argv[1] is the program; where that is built with sanitizers, which take memory of their own, only
+ * the bytes are compared. */
 #include "tests/core_tools.h"
 
 #include <stdio.h>
@@ -74,15 +75,16 @@ static void write_scan(const char *path, kind k, uint32_t count, uint32_t scalar
     assert_int_equal(fclose(out), 0);
 }
 
-/* Builds with a limit of so many MiB. Returns the peak, MiB. */
-static long build(char *scan, char *output, int mebibytes)
+/* Builds with a limit of so many MiB, and so many threads. Returns the peak, MiB. */
+static long build(char *scan, char *output, int mebibytes, int threads)
 {
     int status;
     struct rusage used;
-    char memory[16];
+    char memory[16], count[16];
     snprintf(memory, sizeof memory, "%dM", mebibytes);
-    char *const arguments[] = {"instantpoints", "build", scan, "-o", output,
-                               "--memory",      memory,  "-q", NULL};
+    snprintf(count, sizeof count, "%d", threads);
+    char *const arguments[] = {"instantpoints", "build",     scan,  "-o", output, "--memory",
+                               memory,          "--threads", count, "-q", NULL};
     pid_t child = fork();
     if (child == 0) {
         if (freopen("/dev/null", "wb", stdout) == NULL) _exit(98);
@@ -95,7 +97,7 @@ static long build(char *scan, char *output, int mebibytes)
     return used.ru_maxrss / 1024;
 }
 
-static void check(kind k, uint32_t count, uint32_t scalars)
+static void check(kind k, uint32_t count, uint32_t scalars, int threads)
 {
     char *scan = core_path(folder, "scan.ply"), *least = core_path(folder, "least.ipts"),
          *much = core_path(folder, "much.ipts");
@@ -104,10 +106,10 @@ static void check(kind k, uint32_t count, uint32_t scalars)
     struct stat size;
     assert_int_equal(stat(scan, &size), 0);
     assert_true(size.st_size > 2 * (off_t)LEAST_MIB << 20); /* or it would show nothing */
-    long peak = build(scan, least, LEAST_MIB);
+    long peak = build(scan, least, LEAST_MIB, threads);
     if (MEASURES) assert_in_range(peak, 1, LEAST_MIB);
     else print_message("built with sanitizers: the peak is not measured\n");
-    build(scan, much, 4096);
+    build(scan, much, 4096, 2);
     assert_int_equal(core_findings(least, &err), 0);
     core_assert_same_folders(least, much);
     core_folder_remove(least), core_folder_remove(much); /* and their names */
@@ -118,20 +120,21 @@ static void check(kind k, uint32_t count, uint32_t scalars)
 static void a_site_much_larger_than_its_memory_is_built_in_it(void **state)
 {
     (void)state;
-    check(TRIPOD, 9000000, 1);
+    check(TRIPOD, 9000000, 1, 2);
+    check(TRIPOD, 9000000, 1, 32);
 }
 
 static void wide_points_are_built_in_the_least_memory(void **state)
 {
     (void)state;
-    check(TRIPOD, 600000, SCALARS_MAX);
-    check(CUBE, 600000, SCALARS_MAX);
+    check(TRIPOD, 600000, SCALARS_MAX, 2);
+    check(CUBE, 600000, SCALARS_MAX, 2);
 }
 
 static void wide_points_at_one_position_are_built_in_the_least_memory(void **state)
 {
     (void)state;
-    check(SPOT, 600000, SCALARS_MAX);
+    check(SPOT, 600000, SCALARS_MAX, 2);
 }
 
 int main(int argc, char **argv)

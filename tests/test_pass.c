@@ -83,6 +83,7 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
                          .writer = writer,
                          .levels = w->levels,
                          .arena = arena,
+                         .emit_memory = w->threads * (size_t)PREP_FINISH_BUFFER_MIN,
                          .slice_points = slice,
                          .batch_slices = (w->batch + slice - 1) / slice,
                          .solve_points = w->solve_memory / prep_finish_size(site->stride, 1),
