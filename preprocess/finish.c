@@ -41,9 +41,10 @@ typedef struct {
 } line;
 
 /* Points of a rejection file that all threads solve together. */
-enum { SHARED_MIN = 1 << 20, BUFFER_KEPT_MAX = 8 << 20 };
+enum { SHARED_MIN = 1 << 20 };
 
-/* One thread's memory for the payload of a node. */
+/* One thread's memory for the payload of a node; that of a large one is given back at once. */
+enum { BUFFER_KEPT_MAX = 8 << 20 };
 typedef struct {
     void *memory; /* [size], owned, of prep_pages_take() */
     size_t size;

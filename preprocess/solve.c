@@ -110,16 +110,21 @@ static bool keep(const solver *s, const part *p, uint8_t child_mask, uint32_t ce
     return true;
 }
 
+/* Points whose records fit `size` bytes, but no more than `most`. */
+static uint32_t points_in(size_t size, size_t record_size, uint32_t most)
+{
+    size_t fit = size / record_size;
+    return fit < most ? (uint32_t)fit : most;
+}
+
 uint32_t prep_add_threshold(size_t record_size)
 {
-    size_t fit = PREP_ADD_SIZE / record_size;
-    return fit < PREP_ADD_THRESHOLD ? (uint32_t)fit : PREP_ADD_THRESHOLD;
+    return points_in(PREP_ADD_SIZE, record_size, PREP_ADD_THRESHOLD);
 }
 
 uint32_t prep_pile_points(size_t record_size)
 {
-    size_t fit = PREP_PILE_SIZE / record_size;
-    return fit < PREP_PILE_MAX ? (uint32_t)fit : PREP_PILE_MAX;
+    return points_in(PREP_PILE_SIZE, record_size, PREP_PILE_MAX);
 }
 
 /* All points at one position: as many of them as a node may have, in the order in which they

@@ -65,6 +65,22 @@ void core_folder_remove(char *path)
     free(path);
 }
 
+char *core_folder;
+
+int core_folder_set_up(void **state)
+{
+    (void)state;
+    core_folder = core_folder_make();
+    return 0;
+}
+
+int core_folder_tear_down(void **state)
+{
+    (void)state;
+    core_folder_remove(core_folder);
+    return 0;
+}
+
 char *core_path(const char *folder, const char *format, ...)
 {
     char name[1024];

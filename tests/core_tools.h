@@ -30,6 +30,11 @@ double core_unit(uint64_t *state); /* [0, 1) */
  * it. */
 char *core_folder_make(void);
 void core_folder_remove(char *path);
+
+/* The folder of a test, or of all of a program, for cmocka's set-up and tear-down. */
+extern char *core_folder;
+int core_folder_set_up(void **state);
+int core_folder_tear_down(void **state);
 char *core_path(const char *folder, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 void core_file_write(const char *path, const void *bytes, size_t size);

@@ -18,26 +18,11 @@
 enum { DONE = 0, FAILED = 1, WRONG_USE = 2, LEFT_OUT = 3, ARGUMENTS_MAX = 16 };
 
 static const char *program;
-static char *folder;
 static char out[1 << 16], said[1 << 16]; /* of the last run */
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = core_folder_make();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    core_folder_remove(folder);
-    return 0;
-}
 
 static void read_text(const char *name, char *text, size_t size)
 {
-    char *path = core_path(folder, "%s", name);
+    char *path = core_path(core_folder, "%s", name);
     FILE *f = fopen(path, "rb");
     assert_non_null(f);
     text[fread(text, 1, size - 1, f)] = '\0';
@@ -48,7 +33,7 @@ static void read_text(const char *name, char *text, size_t size)
 
 static void remove_file(const char *name)
 {
-    char *path = core_path(folder, "%s", name);
+    char *path = core_path(core_folder, "%s", name);
     unlink(path);
     free(path);
 }
@@ -67,7 +52,7 @@ static pid_t start(const char *arguments, size_t file_limit)
     for (char *word = strtok(copy, " "); word != NULL && count <= ARGUMENTS_MAX;
          word = strtok(NULL, " "))
         argv[count++] = word;
-    if (chdir(folder) != 0 || freopen("stdout", "wb", stdout) == NULL ||
+    if (chdir(core_folder) != 0 || freopen("stdout", "wb", stdout) == NULL ||
         freopen("stderr", "wb", stderr) == NULL)
         _exit(98);
     if (file_limit > 0) setrlimit(RLIMIT_FSIZE, &(struct rlimit){file_limit, file_limit});
@@ -125,7 +110,7 @@ static void make_las_in(const char *name, uint32_t count, uint16_t epsg)
 {
     int32_t(*xyz)[3] = malloc(count * sizeof *xyz);
     uint64_t random = count;
-    char *path = core_path(folder, "%s", name);
+    char *path = core_path(core_folder, "%s", name);
     assert_non_null(xyz);
     for (uint32_t i = 0; i < count; i++)
         for (int a = 0; a < 3; a++)
@@ -146,14 +131,14 @@ static void make_las(const char *name, uint32_t count)
 
 static void make_text(const char *name, const char *bytes)
 {
-    char *path = core_path(folder, "%s", name);
+    char *path = core_path(core_folder, "%s", name);
     core_file_write(path, bytes, strlen(bytes));
     free(path);
 }
 
 static bool is_there(const char *name)
 {
-    char *path = core_path(folder, "%s", name);
+    char *path = core_path(core_folder, "%s", name);
     bool there = core_exists(path);
     free(path);
     return there;
@@ -496,7 +481,7 @@ static void input_left_out_is_exit_code_3(void **state)
     assert_non_null(strstr(said, "b.las"));
     expect("check site.ipts", DONE);
     /* a damaged file, of which a part is read */
-    char *path = core_path(folder, "a.las");
+    char *path = core_path(core_folder, "a.las");
     assert_int_equal(truncate(path, 227 + 20 * 500 + 3), 0);
     free(path);
     expect("build a.las -o part.ipts --json", LEFT_OUT);
@@ -524,7 +509,7 @@ static void failures_are_exit_code_1_and_one_sentence(void **state)
     (void)state;
     make_las("a.las", 10);
     make_text("b.las", "LASF");
-    char *full = core_path(folder, "full");
+    char *full = core_path(core_folder, "full");
     assert_int_equal(mkdir(full, 0777), 0);
     free(full);
     make_text("full/note.txt", "mine");
@@ -546,7 +531,7 @@ static void check_names_what_is_damaged(void **state)
     (void)state;
     make_las("a.las", 20000);
     expect("build a.las -o site.ipts", DONE);
-    char *path = core_path(folder, "site.ipts/points-00.bin");
+    char *path = core_path(core_folder, "site.ipts/points-00.bin");
     size_t size;
     uint8_t *bytes = core_file_read(path, &size);
     bytes[size / 2] ^= 4;
@@ -569,7 +554,7 @@ static void remove_unfinished(void)
 {
     if (!is_there("site.ipts/metadata.json")) return;
     assert_int_equal(run("check site.ipts"), DONE);
-    char *left = core_path(folder, "site.ipts");
+    char *left = core_path(core_folder, "site.ipts");
     assert_true(mospt_dataset_is_unfinished(left));
     core_folder_remove(left);
 }
@@ -592,7 +577,7 @@ static void a_signal_stops_a_build_and_leaves_nothing_half_done(void **state)
             assert_int_equal(WTERMSIG(status), signals[k % 2]);
             remove_file("stdout"); /* which it may not have had yet */
             remove_file("stderr");
-            assert_int_equal(core_entries(folder), 1);
+            assert_int_equal(core_entries(core_folder), 1);
             continue;
         }
         read_text("stdout", out, sizeof out);
@@ -600,7 +585,7 @@ static void a_signal_stops_a_build_and_leaves_nothing_half_done(void **state)
         code = WEXITSTATUS(status);
         if (code == DONE) {
             assert_int_equal(run("check site.ipts"), DONE);
-            char *path = core_path(folder, "site.ipts");
+            char *path = core_path(core_folder, "site.ipts");
             core_folder_remove(path);
             continue;
         }
@@ -611,7 +596,7 @@ static void a_signal_stops_a_build_and_leaves_nothing_half_done(void **state)
             assert_non_null(strstr(said, "goes on from there"));
             remove_unfinished();
         }
-        assert_int_equal(core_entries(folder), 1); /* the scan */
+        assert_int_equal(core_entries(core_folder), 1); /* the scan */
         stopped++;
     }
     assert_true(stopped > 0);
@@ -635,13 +620,13 @@ static void a_killed_build_goes_on_to_the_same_bytes(void **state)
         }
     }
     run("build a.las -o site.ipts"); /* refused if it was done */
-    char *whole = core_path(folder, "whole.ipts"), *path = core_path(folder, "site.ipts");
+    char *whole = core_path(core_folder, "whole.ipts"), *path = core_path(core_folder, "site.ipts");
     core_assert_same_folders(whole, path);
     core_folder_remove(whole);
     core_folder_remove(path);
-    unlink((path = core_path(folder, "stdout"))), free(path);
-    unlink((path = core_path(folder, "stderr"))), free(path);
-    assert_int_equal(core_entries(folder), 1);
+    unlink((path = core_path(core_folder, "stdout"))), free(path);
+    unlink((path = core_path(core_folder, "stderr"))), free(path);
+    assert_int_equal(core_entries(core_folder), 1);
 }
 
 static void a_full_disk_is_one_sentence_and_leaves_nothing_half_done(void **state)
@@ -655,7 +640,7 @@ static void a_full_disk_is_one_sentence_and_leaves_nothing_half_done(void **stat
         assert_string_equal(out, "");
         if (lines_of(said) != 1 || strncmp(said, "instantpoints: ", 15) != 0) fail_msg("%s", said);
         remove_unfinished();
-        assert_int_equal(core_entries(folder), 1);
+        assert_int_equal(core_entries(core_folder), 1);
     }
     signal(SIGXFSZ, SIG_DFL);
 }
@@ -666,10 +651,10 @@ static void a_limit_on_the_size_of_files_is_like_a_full_disk(void **state)
     make_las("a.las", 20000);
     assert_int_equal(finish(start("build a.las -o site.ipts -q", 5000)),
                      FAILED); /* not ended by SIGXFSZ */
-    assert_int_equal(core_entries(folder), 1);
+    assert_int_equal(core_entries(core_folder), 1);
 }
 
-#define CASE(f) cmocka_unit_test_setup_teardown(f, set_up, tear_down)
+#define CASE(f) cmocka_unit_test_setup_teardown(f, core_folder_set_up, core_folder_tear_down)
 
 int main(int argc, char **argv)
 {

@@ -22,22 +22,6 @@ enum { LEAST_MIB = 64, SCALARS_MAX = 60 };
 typedef enum { SPOT, CUBE, TRIPOD } kind;
 
 static const char *program;
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = core_folder_make();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    core_folder_remove(folder);
-    return 0;
-}
-
 static float unit(uint64_t *random)
 {
     return (float)core_below(random, 1 << 24) / (float)(1 << 24);
@@ -99,8 +83,8 @@ static long build(char *scan, char *output, int mebibytes, int threads)
 
 static void check(kind k, uint32_t count, uint32_t scalars, int threads)
 {
-    char *scan = core_path(folder, "scan.ply"), *least = core_path(folder, "least.ipts"),
-         *much = core_path(folder, "much.ipts");
+    char *scan = core_path(core_folder, "scan.ply"), *least = core_path(core_folder, "least.ipts"),
+         *much = core_path(core_folder, "much.ipts");
     mospt_err err = {0};
     write_scan(scan, k, count, scalars);
     struct stat size;
@@ -146,5 +130,5 @@ int main(int argc, char **argv)
     };
     if (argc != 2) return 2;
     program = argv[1];
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, core_folder_set_up, core_folder_tear_down);
 }

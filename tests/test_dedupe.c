@@ -9,22 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = core_folder_make();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    core_folder_remove(folder);
-    return 0;
-}
-
 /* Position and place of arrival. */
 typedef struct {
     uint32_t g[3], index;
@@ -108,7 +92,7 @@ static void check_way(const core_site *site, const way *y, const wanted *w)
     prep_shape shape = core_shape(site, 5, 100);
     CORE_NEED(prep_workers_create(y->threads, &workers, &err));
     CORE_NEED(
-        prep_store_create(folder, site->stride, y->block_size, y->store_memory, &store, &err));
+        prep_store_create(core_folder, site->stride, y->block_size, y->store_memory, &store, &err));
     CORE_NEED(prep_arena_create(y->solve_memory, &arena, &err));
     prep_pass_env env = {.shape = &shape,
                          .workers = workers,
@@ -194,5 +178,5 @@ int main(void)
         cmocka_unit_test(the_first_at_each_position_is_kept),
         cmocka_unit_test(copies_far_apart_in_time_are_found),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, core_folder_set_up, core_folder_tear_down);
 }

@@ -112,39 +112,23 @@ static bool pass_build(const core_site *site, const prep_shape *shape, const way
     return ok;
 }
 
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = core_folder_make();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    core_folder_remove(folder);
-    return 0;
-}
-
 static void check_ways(const core_site *site, uint32_t depth, uint32_t threshold, const way *ways,
                        size_t way_count)
 {
     prep_shape shape = core_shape(site, depth, threshold);
     mospt_err err = {0};
-    char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+    char *want = core_path(core_folder, "want.ipts"), *got = core_path(core_folder, "got.ipts");
     core_dataset_make(site, depth, threshold, want);
     assert_int_equal(core_findings(want, &err), 0);
     for (size_t k = 0; k < way_count; k++) {
-        CORE_NEED(pass_build(site, &shape, &ways[k], got, folder, NULL, &err));
+        CORE_NEED(pass_build(site, &shape, &ways[k], got, core_folder, NULL, &err));
         core_assert_same_folders(want, got);
         core_folder_remove(got);
-        got = core_path(folder, "got.ipts");
+        got = core_path(core_folder, "got.ipts");
     }
     core_folder_remove(want);
     free(got);
-    assert_int_equal(core_entries(folder), 0);
+    assert_int_equal(core_entries(core_folder), 0);
 }
 
 /* Every combination in which the parts of a pass meet each other, thinned by a fixed stride. */
@@ -253,14 +237,14 @@ static void stopping_at_any_report_is_a_cancellation(void **state)
     core_site site;
     core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
     prep_shape shape = core_shape(&site, 3, 30);
-    char *got = core_path(folder, "got.ipts");
+    char *got = core_path(core_folder, "got.ipts");
     uint32_t reports = 0;
     for (uint32_t stop_after = 0;; stop_after = stop_after < 10 ? stop_after + 1 : stop_after * 3) {
         mospt_err err = {0};
         way w = {
             .levels = 2, .threads = 2, .batch = 1000, .block_size = 400, .solve_memory = 60000};
         stopper left = {.reports_left = stop_after};
-        if (pass_build(&site, &shape, &w, got, folder, &left, &err)) break;
+        if (pass_build(&site, &shape, &w, got, core_folder, &left, &err)) break;
         assert_int_equal(err.code, MOSPT_ECANCELLED);
         assert_false(core_exists(got));
         reports++;
@@ -268,7 +252,7 @@ static void stopping_at_any_report_is_a_cancellation(void **state)
     assert_true(reports > 10);
     core_folder_remove(got);
     core_site_fini(&site);
-    assert_int_equal(core_entries(folder), 0);
+    assert_int_equal(core_entries(core_folder), 0);
 }
 
 /* Stops a build again and again, each time a little later and building in another way, and checks
@@ -297,7 +281,7 @@ static uint32_t interrupt(const core_site *site, const prep_shape *shape, uint32
     for (uint32_t k = 0;; k++) {
         mospt_err err = {0};
         stopper stop = {.reports_left = k * more, .commits = true};
-        if (pass_build(site, shape, &ways[k % 4], path, folder, &stop, &err)) return found;
+        if (pass_build(site, shape, &ways[k % 4], path, core_folder, &stop, &err)) return found;
         assert_int_equal(err.code, MOSPT_ECANCELLED);
         if (!core_exists(path)) continue;
         mospt_metadata m;
@@ -318,7 +302,7 @@ static void an_interrupted_build_goes_on_to_the_same_bytes(void **state)
     for (int kind = 0; kind < CORE_KINDS; kind++) {
         core_site site;
         core_site_make((core_kind)kind, 16, 6000, (uint64_t)kind, &site);
-        char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+        char *want = core_path(core_folder, "want.ipts"), *got = core_path(core_folder, "got.ipts");
         prep_shape shape = core_shape(&site, 3, 30);
         core_dataset_make(&site, 3, 30, want);
         uint32_t found = interrupt(&site, &shape, 7, got);
@@ -328,7 +312,7 @@ static void an_interrupted_build_goes_on_to_the_same_bytes(void **state)
         core_folder_remove(got);
         core_site_fini(&site);
     }
-    assert_int_equal(core_entries(folder), 0);
+    assert_int_equal(core_entries(core_folder), 0);
 }
 
 static void what_is_damaged_is_made_again(void **state)
@@ -337,12 +321,12 @@ static void what_is_damaged_is_made_again(void **state)
     core_site site;
     core_site_make(CORE_CLUSTERED, 16, 6000, 5, &site);
     prep_shape shape = core_shape(&site, 3, 30);
-    char *want = core_path(folder, "want.ipts"), *got = core_path(folder, "got.ipts");
+    char *want = core_path(core_folder, "want.ipts"), *got = core_path(core_folder, "got.ipts");
     const way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
     mospt_err err = {0};
     core_dataset_make(&site, 3, 30, want);
     stopper stop = {.reports_left = 60, .commits = true};
-    CORE_FAILS(pass_build(&site, &shape, &w, got, folder, &stop, &err), MOSPT_ECANCELLED);
+    CORE_FAILS(pass_build(&site, &shape, &w, got, core_folder, &stop, &err), MOSPT_ECANCELLED);
     for (int level = 0; level < 3; level++) {
         char *path = core_path(got, "points-%02d.bin", level);
         size_t size;
@@ -352,7 +336,7 @@ static void what_is_damaged_is_made_again(void **state)
         free(bytes), free(path);
     }
     assert_true(core_findings(got, NULL) > 0);
-    CORE_NEED(pass_build(&site, &shape, &w, got, folder, NULL, &err));
+    CORE_NEED(pass_build(&site, &shape, &w, got, core_folder, NULL, &err));
     core_assert_same_folders(want, got);
     core_folder_remove(want);
     core_folder_remove(got);
@@ -366,12 +350,12 @@ static void points_that_have_changed_are_an_error(void **state)
     core_site_make(CORE_CLUSTERED, 16, 6000, 5, &site);
     core_site_make(CORE_CLUSTERED, 16, 6000, 6, &other);
     prep_shape shape = core_shape(&site, 3, 30);
-    char *got = core_path(folder, "got.ipts");
+    char *got = core_path(core_folder, "got.ipts");
     const way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
     mospt_err err = {0};
     stopper stop = {.reports_left = 60, .commits = true};
-    CORE_FAILS(pass_build(&site, &shape, &w, got, folder, &stop, &err), MOSPT_ECANCELLED);
-    CORE_FAILS(pass_build(&other, &shape, &w, got, folder, NULL, &err), MOSPT_EFORMAT);
+    CORE_FAILS(pass_build(&site, &shape, &w, got, core_folder, &stop, &err), MOSPT_ECANCELLED);
+    CORE_FAILS(pass_build(&other, &shape, &w, got, core_folder, NULL, &err), MOSPT_EFORMAT);
     assert_int_equal(core_findings(got, NULL), 0); /* of the first site */
     core_folder_remove(got);
     core_site_fini(&site);
@@ -387,7 +371,7 @@ static void a_scratch_disk_that_fills_up_is_an_error(void **state)
     core_site site;
     core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
     prep_shape shape = core_shape(&site, 3, 30);
-    char *got = core_path(folder, "got.ipts");
+    char *got = core_path(core_folder, "got.ipts");
     signal(SIGXFSZ, SIG_IGN);
     getrlimit(RLIMIT_FSIZE, &old);
     for (size_t k = 0; k < sizeof limits / sizeof limits[0]; k++) {
@@ -397,7 +381,7 @@ static void a_scratch_disk_that_fills_up_is_an_error(void **state)
             small = old;
             small.rlim_cur = limits[k];
             setrlimit(RLIMIT_FSIZE, &small);
-            bool ok = pass_build(&site, &shape, &w, got, folder, NULL, &err);
+            bool ok = pass_build(&site, &shape, &w, got, core_folder, NULL, &err);
             setrlimit(RLIMIT_FSIZE, &old);
             assert_false(ok);
             assert_int_equal(err.code, MOSPT_EIO);
@@ -415,7 +399,7 @@ static void a_scratch_folder_that_is_not_there_is_an_error(void **state)
     core_site site;
     core_site_make(CORE_CLUSTERED, 16, 6000, 2, &site);
     prep_shape shape = core_shape(&site, 3, 30);
-    char *got = core_path(folder, "got.ipts"), *scratch = core_path(folder, "nowhere");
+    char *got = core_path(core_folder, "got.ipts"), *scratch = core_path(core_folder, "nowhere");
     way w = {.levels = 2, .threads = 2, .batch = 1000, .block_size = 400};
     CORE_FAILS(pass_build(&site, &shape, &w, got, scratch, NULL, &err), MOSPT_EIO);
     assert_string_equal(err.file, scratch);
@@ -439,5 +423,5 @@ int main(void)
         cmocka_unit_test(a_scratch_disk_that_fills_up_is_an_error),
         cmocka_unit_test(a_scratch_folder_that_is_not_there_is_an_error),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, core_folder_set_up, core_folder_tear_down);
 }

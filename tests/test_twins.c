@@ -10,25 +10,9 @@
 #include <string.h>
 #include <unistd.h>
 
-static char *folder;
-
-static int set_up(void **state)
-{
-    (void)state;
-    folder = core_folder_make();
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    core_folder_remove(folder);
-    return 0;
-}
-
 static char *build(const char *scan, const char *name)
 {
-    char *output = core_path(folder, "%s.ipts", name);
+    char *output = core_path(core_folder, "%s.ipts", name);
     const prep_build_options options = {.inputs = &scan,
                                         .input_count = 1,
                                         .output = output,
@@ -117,7 +101,7 @@ static void twins_become_the_same_dataset(void **state)
                                               {.chunk_points = 7000},
                                               {.chunk_points = 20000, .varies = true},
                                               {.chunk_points = 120000}};
-    char *las = core_path(folder, "scan.las"), *laz = core_path(folder, "scan.laz");
+    char *las = core_path(core_folder, "scan.las"), *laz = core_path(core_folder, "scan.laz");
     for (uint8_t format = 1; format <= 7; format += 3) {
         const write_las_options options = {.minor = 4,
                                            .format = format,
@@ -160,5 +144,5 @@ int main(void)
         cmocka_unit_test(twins_become_the_same_dataset),
         cmocka_unit_test(real_twins_become_the_same_dataset),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, core_folder_set_up, core_folder_tear_down);
 }
